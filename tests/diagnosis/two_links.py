@@ -1,4 +1,4 @@
-"""An arm of two links in a vertical plane: what its elbow needs while both joints move.
+"""Arms of two and three links: what a joint needs while all move; first the elbow in a vertical plane.
 
     tau_2 = (I + m c^2) (a_1 + a_2) + m l c (cos(q_2) a_1 + sin(q_2) v_1^2) + m g c sin(q_1 + q_2) + friction
 
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 from wandering import swing
 
 from cosim.data.recording import Recording
@@ -19,6 +20,8 @@ Array = npt.NDArray[np.float64]
 OWN, LEVER, WEIGHT = 0.064, 0.03, 1.2
 """I + m c^2 and m l c [kg m2], and m g c [N m]."""
 FC, VISCOUS = 0.15, 0.08
+SLOW = 2.5
+"""As arms move: weights need more torque than accelerations do."""
 NOISE, READING = 0.01, 2e-5
 """RMS of the torque's noise [N m] and of the encoders' [rad]."""
 
@@ -37,6 +40,16 @@ def tones(t: Array, seed: int, size: float) -> Joint:
     phases = dice.uniform(0, 2 * np.pi, 4)
     hertz = [f * dice.uniform(0.85, 1.15) for f in (0.15, 0.4, 0.9, 1.9)]
     return Joint(*swing(t, [(size / k, f, p) for k, f, p in zip((1, 2, 4, 8), hertz, phases, strict=True)]))
+
+
+def slow_times() -> Array:
+    """Times at which a slow motion is recorded."""
+    return np.arange(0.0, 24.0, 0.01)
+
+
+def slow(one: Joint) -> Joint:
+    """A motion of `t / SLOW` over t."""
+    return Joint(one.q, one.v / SLOW, one.a / SLOW**2)
 
 
 def still(t: Array) -> Joint:
@@ -81,6 +94,59 @@ def joint(
         tau = tau + inertia * one.a + weight * np.sin(own.q + one.q)
     table = {"t": t, "tau": tau + dice.normal(0, noise, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
     table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in enumerate(others, 1)}
+    return Recording.of(table, f"run {seed}")
+
+
+LEVER_OF_FOREARM = 0.3
+"""Mass times distance from the axis [kg m]."""
+LINKS, TIP = (0.4, 0.3), (0.05, 0.6, 0.2)
+"""Lengths of the two links before a wrist [m]; behind it inertia about its axis [kg m2], mass [kg], lever arm [m]."""
+
+
+def wrist(seed: int, idle: int = 0) -> Recording:
+    """The third of three parallel joints, all of which swing, hand down at 0; shoulder and elbow are `q1`, `q2`.
+
+        tau_3 = I (a_1 + a_2 + a_3) + m c (x'' cos(th) + y'' sin(th)) + m g c sin(th) + friction,  th = q_1 + q_2 + q_3
+
+    (x, y) is where the wrist is, accelerated by both links before it: Newton and Euler's equations of the last link.
+
+    Args:
+        seed: of motion and noise.
+        idle: joints `q4` and so on that swing, too, and do nothing.
+    """
+    t, dice = slow_times(), np.random.default_rng(seed)
+    shoulder, elbow, own, *others = (slow(tones(t / SLOW, 1000 * seed + 7 * k, 0.8)) for k in range(3 + idle))
+    inertia, mass, lever = TIP
+    ax, ay, angle, rate, turn = (0 * t for _ in range(5))
+    for one, length in zip((shoulder, elbow), LINKS, strict=True):
+        angle, rate, turn = angle + one.q, rate + one.v, turn + one.a
+        ax = ax + length * (np.cos(angle) * turn - np.sin(angle) * rate**2)
+        ay = ay + length * (np.sin(angle) * turn + np.cos(angle) * rate**2)
+    angle, turn = angle + own.q, turn + own.a
+    tau = inertia * turn + mass * lever * (np.cos(angle) * ax + np.sin(angle) * (ay + 9.81))
+    tau = tau + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v
+    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
+    moved = dict(zip((1, 2, *range(4, 4 + idle)), (shoulder, elbow, *others), strict=True))
+    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in moved.items()}
+    return Recording.of(table, f"run {seed}")
+
+
+def forearm(seed: int) -> Recording:
+    """A joint whose axis points along x behind one about x, `q1`, and one about y, `q2`; a weight hangs on it.
+
+    Its torque is that of the weight about the axis, r x F turned by the rotations of the three joints; nothing else
+    of the links has mass. The joint about y swings about .8 rad: at 0 the others are parallel.
+    """
+    t, dice = slow_times(), np.random.default_rng(seed)
+    shoulder, twist, own = (slow(tones(t / SLOW, 1000 * seed + 7 * k, 0.8)) for k in range(3))
+    twist = Joint(0.8 + twist.q, twist.v, twist.a)
+    along, across = (Rotation.from_euler(a, one.q[:, None]) for a, one in (("x", shoulder), ("y", twist)))
+    turned = along * across * Rotation.from_euler("x", own.q[:, None])
+    torque = np.cross(turned.apply([0.0, LEVER_OF_FOREARM, 0.0]), [0.0, 0.0, -9.81])
+    axis = (along * across).apply([1.0, 0.0, 0.0])
+    tau = OWN * own.a + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v - np.sum(axis * torque, axis=1)
+    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
+    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in ((1, shoulder), (2, twist))}
     return Recording.of(table, f"run {seed}")
 
 

@@ -135,6 +135,16 @@ LOADS: dict[str, Callable[[Any, Motion], float]] = {
     "WeightCoupling": lambda e, m: (
         0.4 * m.inputs["neighbour_acceleration"] + 1.5 * math.sin(m.angle + m.inputs["neighbour_position"] + 0.2)
     ),
+    "ChainCoupling": lambda e, m: (
+        1.5 * math.sin(m.angle + m.inputs["neighbour_position"] - m.inputs["second_neighbour_position"] + 0.2)
+    ),
+    "SpaceCoupling": lambda e, m: (
+        (
+            0.7 * math.sin(m.angle) * math.sin(m.inputs["neighbour_position"])
+            - 1.5 * math.cos(m.angle) * math.cos(m.inputs["neighbour_position"])
+        )
+        * math.cos(m.inputs["second_neighbour_position"])
+    ),
     "BoucWen": lambda e, m: 0.8 * m.state[0],
     "PeriodicDisturbance": lambda e, m: 0.6 * math.sin(2 * math.pi * 3 * m.t + 0.2),
     "LearnedTorque": lambda e, m: table(e, e.torque, -1, 1.2, m.q),
@@ -184,7 +194,7 @@ def motions(effect: Effect, seed: int) -> list[Motion]:
     dice, found = Random(seed), []
     for k in range(12):
         names = ("temperature", "altitude", "azimuth_rate", "load_torque", "altitude_rate")
-        names += ("neighbour_position", "neighbour_speed", "neighbour_acceleration")
+        names += ("neighbour_position", "neighbour_speed", "neighbour_acceleration", "second_neighbour_position")
         inputs = {name: dice.uniform(10, 40) if name == "temperature" else dice.uniform(-2, 2) for name in names}
         speed = (0.0, dice.uniform(0.01, 2), -dice.uniform(0.01, 2), dice.uniform(-2e-4, 2e-4))[k % 4]
         state = [abs(dice.uniform(-1.5, 1.5)) if one.low >= 0 else dice.uniform(-1.5, 1.5) for one in effect.states()]

@@ -30,6 +30,8 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "AxisCoupling": {"inertia": 0.4},
     "DampedCoupling": {"inertia": 0.4, "damping": 0.3},
     "WeightCoupling": {"inertia": 0.4, "weight": 1.5, "phase": 0.2},
+    "ChainCoupling": {"weight": 1.5, "phase": 0.2, "follows_second": -1.0, "neighbour": "q2 + q3"},
+    "SpaceCoupling": {"ssc": 0.7, "ccc": -1.5, "neighbour": "q2 + q3"},
     "ThermalViscosity": {"viscous_per_degC": -0.04, "coulomb_per_degC": -0.02},
     "WarmingViscosity": {"viscous_per_degC": -0.04, "warm_up_degC": 15.0, "warm_up_s": 30.0},
     "RubbedViscosity": {"viscous_per_degC": -0.04, "heat_degC_per_rad": 8.0, "cooling_s": 30.0},

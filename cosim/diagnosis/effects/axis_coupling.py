@@ -1,6 +1,7 @@
 """A neighbouring axis whose motion was recorded acts on this one."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations, product
 from math import atan2, hypot, inf, pi
 from typing import Any, ClassVar
 
@@ -17,33 +18,56 @@ from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.support.statistics import column_rms
 from pyfmi_models.effects import Effect
-from pyfmi_models.effects.axis_coupling import AxisCoupling, DampedCoupling, WeightCoupling
+from pyfmi_models.effects.axis_coupling import (
+    AND,
+    PRODUCTS,
+    AxisCoupling,
+    ChainCoupling,
+    DampedCoupling,
+    Neighbouring,
+    SpaceCoupling,
+    WeightCoupling,
+)
 from pyfmi_models.mount import Mount
 
 FOLLOWS = (1.0, 0.0, -1.0)
 """Whether a weight turns with this axis too, or with the neighbour alone; -1 where both count the other way round."""
+TURNS = tuple(product(FOLLOWS, (1.0, -1.0)))
+"""The same of a weight behind three axes, and which way the second neighbour counts."""
 LEAST_MORE = 5.0
-"""Nats that a damping or a weight must have in addition to the inertia: odds of 150 to 1."""
+"""Nats that a form of more numbers must have in addition: odds of 150 to 1."""
+Form = type[Neighbouring]
 
 
-class NeighbouringAxis(Hypothesis[AxisCoupling]):
-    """An inertia that both axes accelerate, alone or with a damping or a weight beside it."""
+class NeighbouringAxis(Hypothesis[Neighbouring]):
+    """An inertia that both axes accelerate, alone or with a damping or a weight; a weight that hangs on three axes."""
 
-    forms = (AxisCoupling, DampedCoupling, WeightCoupling)
-    sizes: ClassVar[tuple[str, ...]] = ("inertia", "damping", "weight")
+    forms = (AxisCoupling, DampedCoupling, WeightCoupling, ChainCoupling, SpaceCoupling)
+    sizes: ClassVar[tuple[str, ...]] = ("inertia", "damping", "weight", *PRODUCTS)
     rank: ClassVar[float] = 14.5
     needs_position: ClassVar[bool] = False
     view = "time"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
-        """Each neighbour: its acceleration, with its speed, and the weight that turns with it."""
+        """Each neighbour: its acceleration, with its speed, and the weight that turns with it; weights behind two."""
         for one in _free(span.prepared.neighbours, mount):
             yield from _moved_by(one, mount)
+        for pair in _pairs(span.prepared.neighbours, mount):
+            yield from _hung_on(pair)
 
-    def tuned(self, problem: Problem, found: Fit, start: AxisCoupling, evidence: Evidence) -> Fit:
+    def tuned(self, problem: Problem, found: Fit, start: Neighbouring, evidence: Evidence) -> Fit:
         """The simplest form that explains it: a damping or a weight only where it adds evidence to the inertia."""
+        if len(start.neighbours) > 1:
+            return _spared(problem, found, evidence)
+        fits = self._single(problem, found, start, evidence)
+        worth = {form: evidence(fit) for form, fit in fits.items()}
+        least = max(worth.values()) - LEAST_MORE
+        return next(fits[form] for form in self.forms if worth.get(form, -inf) >= least)
+
+    def _single(self, problem: Problem, found: Fit, start: Neighbouring, evidence: Evidence) -> dict[Form, Fit]:
+        """Fits of each form that one neighbour may have."""
         one = next((one for one in problem.prepared.neighbours if one.name == start.neighbour), None)
-        fits = {type(start): found}
+        fits: dict[Form, Fit] = {type(start): found}
         fitted: Any = found.mount.effects[-1]
         inertia = AxisCoupling(inertia=fitted.inertia, neighbour=start.neighbour)
         if AxisCoupling not in fits:
@@ -54,15 +78,13 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
             if one and _both_turn(one, found.mount):
                 loads = [_weight_left(problem, found, inertia, follows) for follows in FOLLOWS]
                 fits[WeightCoupling] = max((restarted(problem, found, load) for load in loads), key=evidence)
-        worth = {form: evidence(fit) for form, fit in fits.items()}
-        least = max(worth.values()) - LEAST_MORE
-        return next(fits[form] for form in self.forms if worth.get(form, -inf) >= least)
+        return fits
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """An inertia coupling to each neighbour: what its size counts in is not what a weight counts in."""
         return [one for one in tried if type(one.instances[0]) is AxisCoupling]
 
-    def where(self, effect: AxisCoupling, reach: Reach) -> Where:
+    def where(self, effect: Neighbouring, reach: Reach) -> Where:
         """Wherever the neighbour moves."""
         return Where(axis="everywhere", description=f"wherever {effect.called} moves", regions=())
 
@@ -75,17 +97,48 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
             return f"{_listed(free)} stands still, is this axis itself, or follows its motion"
         return UNSEEN if free else HELD
 
-    def remark(self, effect: AxisCoupling, prepared: Prepared) -> str:
+    def remark(self, effect: Neighbouring, prepared: Prepared) -> str:
         """Neighbours that move in proportion to this one: no recording of both tells which of them acts."""
-        alike = [one for one in prepared.neighbours_recorded if prepared.followed.get(one.name) == effect.neighbour]
-        others = _listed([one for one in alike if one.name != effect.neighbour], " or ")
-        return f"It may as well be {others}: {effect.called} moves in proportion to that." if others else ""
+        said = []
+        for name in effect.neighbours:
+            alike = [one for one in prepared.neighbours_recorded if prepared.followed.get(one.name) == name]
+            others = _listed([one for one in alike if one.name != name], " or ")
+            said += [f"It may as well be {others}: `{name}` moves in proportion to that."] if others else []
+        return " ".join(said)
 
 
 def _free(several: Sequence[Neighbour], mount: Mount) -> list[Neighbour]:
     """Neighbours with which a mount has no coupling yet; one that names none is that with the only neighbour."""
     taken = {one.source for one in mount.effects if one.id == AxisCoupling.id}
     return [one for one in several if not taken & {one.name, ""}]
+
+
+def _pairs(several: Sequence[Neighbour], mount: Mount) -> list[str]:
+    """Two neighbours on which a weight may hang beside this axis, and with which the mount has none yet."""
+    taken = {one.source for one in mount.effects if one.id == AxisCoupling.id}
+    turning = [one.name for one in several if _both_turn(one, mount)]
+    return [name for name in map(AND.join, combinations(turning, 2)) if not taken & {name, ""}]
+
+
+def _hung_on(pair: str) -> Iterator[Candidate]:
+    """Weights that may hang on two neighbours."""
+    for own, other in TURNS:
+
+        def chain(c: Array, own: float = own, other: float = other) -> Effect:
+            return _chain(pair, (own, other), hypot(*c), atan2(c[1], c[0]))
+
+        both = tuple(_chain(pair, (own, other), 0.0, phase) for phase in (0.0, pi / 2))
+        yield Candidate("axis_coupling", both, ("weight",), chain)
+
+    def space(c: Array) -> Effect:
+        return SpaceCoupling(neighbour=pair, **dict(zip(PRODUCTS, map(float, c), strict=True)))
+
+    yield Candidate("axis_coupling", (SpaceCoupling(neighbour=pair),), PRODUCTS, space)
+
+
+def _chain(pair: str, turns: tuple[float, float], weight: float, phase: float) -> ChainCoupling:
+    own, other = turns
+    return ChainCoupling(weight=weight, phase=phase, follows=own, follows_second=other, neighbour=pair)
 
 
 def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
@@ -119,13 +172,52 @@ def _both_turn(one: Neighbour, mount: Mount) -> bool:
 
 def _weight_left(problem: Problem, found: Fit, coupling: AxisCoupling, follows: float) -> Effect:
     """A weight on both axes as large as what an inertia leaves says."""
-    prepared, name = problem.prepared, coupling.neighbour
-    angle = follows * prepared.stacked("q") + prepared.of_neighbour(key(name, "position"))
+    name = coupling.neighbour
+    load, phase, _ = _wave_left(problem, found, follows, {name: 1.0})
+    return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
+
+
+def _spared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
+    """A fit whose last effect hangs on two neighbours, or with what hangs on fewer or in fewer numbers.
+
+    More needs evidence where both count few ways of being wrong: an inertia that changes with the angles, which neither
+    holds, has the products of sine and cosine, too, and a neighbour that moves little takes up what others leave.
+    """
+    wave = _simpler(problem, found)
+    if wave is None:
+        return found
+    fit = restarted(problem, found, wave)
+    if evidence(found, True) > evidence(fit, True) + LEAST_MORE:
+        return found
+    return _spared(problem, fit, evidence) if AND in wave.neighbour else fit
+
+
+def _simpler(problem: Problem, found: Fit) -> Neighbouring | None:
+    """The weight on one neighbour, or behind parallel axes, that explains most in the place of what hangs on two."""
+    last: Any = found.mount.effects[-1]
+    rest, (first, second) = problem.without(found, last.name), last.neighbours
+    ways = [(own, {first: 1.0, second: other}) for own, other in TURNS if type(last) is SpaceCoupling]
+    taken = {one.source for one in rest.mount.effects}
+    ways += [(own, {name: 1.0}) for own in FOLLOWS for name in (first, second) if name not in taken]
+    waves = [(_wave_left(problem, rest, *way), *way) for way in ways]
+    if not waves:
+        return None
+    (load, phase, _), own, others = min(waves, key=lambda one: one[0][2])
+    if len(others) > 1:
+        return _chain(last.neighbour, (own, others[second]), load, phase)
+    return WeightCoupling(weight=load, phase=phase, follows=own, neighbour=next(iter(others)))
+
+
+def _wave_left(problem: Problem, found: Fit, follows: float, others: Mapping[str, float]) -> tuple[float, float, float]:
+    """Weight, phase and error of what a fit leaves over an angle: so many turns of this axis and of each neighbour."""
+    prepared = problem.prepared
+    theirs = [turns * prepared.of_neighbour(key(name, "position")) for name, turns in others.items()]
+    angle = np.sum([follows * prepared.stacked("q"), *theirs], axis=0)
     columns = np.column_stack([np.sin(angle), np.cos(angle), found.slopes]) * problem.weight[:, None]
     size = column_rms(columns) + 1e-300
-    c = np.linalg.lstsq(columns / size, found.residual * problem.weight, rcond=1e-9)[0] / size
-    load, phase = max(hypot(c[0], c[1]), 1e-9), atan2(c[1], c[0])
-    return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
+    left = found.residual * problem.weight
+    c = np.linalg.lstsq(columns / size, left, rcond=1e-9)[0] / size
+    return max(hypot(c[0], c[1]), 1e-9), atan2(c[1], c[0]), float(np.linalg.norm(left - columns @ c))
 
 
 def _listed(several: Sequence[Neighbour], between: str = ", ") -> str:

@@ -39,7 +39,8 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 Form = TypeVar("Form", bound=Effect)
-Evidence = Callable[[Fit], float]
+Evidence = Callable[..., float]
+"""Nats of a fit; with True behind it, where a few ways of being wrong count and no rows, as between two names."""
 View = Literal[
     "position",
     "one pitch",

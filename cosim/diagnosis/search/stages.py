@@ -157,8 +157,8 @@ def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) ->
     found, aside = problem.fit(grown, 36), aside_for(effect.id)
     before = comparison.evidence(current, aside, beside=current)
 
-    def gain(fit: Fit) -> float:
-        return comparison.evidence(fit, aside, beside=current) - before
+    def gain(fit: Fit, few: bool = False) -> float:
+        return comparison.evidence(fit, aside, few, beside=current) - before
 
     found = hypothesis_of(effect).tuned(problem, found, effect, gain)
     return replace(weighed(comparison, found, current, many), is_rough=True)

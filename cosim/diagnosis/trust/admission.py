@@ -42,10 +42,10 @@ def is_held(effect: Effect) -> bool:
 
 def check_neighbours(mount: Mount, recordings: Sequence[Recording]) -> None:
     """Refuse a card that names a neighbour of which a recording has no column (RecordingError)."""
-    for name in (effect.neighbour for effect in mount.effects if hasattr(effect, "neighbour")):
+    for name in (name for effect in mount.effects for name in getattr(effect, "neighbours", ())):
         for one in recordings:
             there = [each.name for each in neighbours(one.columns, one.units)]
-            if name and name not in there:
+            if name not in there:
                 listed = f"neighbours are: {', '.join(there)}" if there else "it has no column of a neighbour"
                 text = f'{one.name}: the card\'s axis_coupling reads "{name}", which this recording lacks; {listed}.'
                 raise RecordingError(text, culprit=name, choices=tuple(there))
