@@ -25,11 +25,10 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _admitted, _refitted
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.diagnosis.terms.candidate_terms import candidate_terms
 from cosim.diagnosis.terms.grams import columns_of, grams_of
 from cosim.diagnosis.terms.learn import allowed, is_recorded
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from cosim_studies.proof.cases import cases_of
 from cosim_studies.proof.make import make
 from cosim_studies.proof.tool import given
@@ -71,7 +70,7 @@ def best_class(folder: str) -> str:
     train, heldout, _ = _admitted(read, [held_out], card)
     problem, base, _ = _refitted(train, heldout, card)
     comparison = Comparison.of(problem, base, POLICY)
-    held = Predictive.of(comparison, prepare(heldout, problem.prepared.band), base, prepare(heldout, CUTOFF))
+    held = Predictive.of(comparison, prepare(heldout, problem.prepared.band), base, prepare(heldout, PROTOCOL_HZ))
     terms = [one for one in candidate_terms(base.mount, problem.prepared) if is_recorded(one, held)]
     grams = grams_of(comparison, base, [columns_of(base.mount, one, problem.prepared) for one in terms], terms)
     every = list(range(grams.recordings))

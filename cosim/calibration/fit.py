@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from cosim.calibration.experiment import Array
 from cosim.calibration.free import Free
 from cosim.calibration.residuals import Residuals
+from cosim.support.statistics import robust_rms
 
 Loss = Literal["linear", "soft_l1"]
 LOSSES: tuple[Loss, ...] = get_args(Loss)
@@ -46,8 +47,6 @@ REACH = 0.1
 """Greatest deviation that is drawn, relative to a number's scale."""
 BAD = 10.0
 """Rows of a point that cannot be simulated, times the RMS at the start."""
-OUTLIER = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 @dataclass(frozen=True)
@@ -211,9 +210,9 @@ def _agreeing(found: Sequence[tuple[float, Array]]) -> int:
 
 
 def _outlier(z: Array, loss: str) -> float:
-    return 1.0 if loss == "linear" else max(OUTLIER * float(np.median(np.abs(z))), EXACT)
+    return 1.0 if loss == "linear" else max(robust_rms(z), EXACT)
 
 
 def _size(rest: Array, loss: str) -> float:
     """Size of the residuals of an output; a robust one where outliers are expected."""
-    return float(np.sqrt(np.mean(rest**2))) if loss == "linear" else OUTLIER * float(np.median(np.abs(rest)))
+    return float(np.sqrt(np.mean(rest**2))) if loss == "linear" else robust_rms(rest)

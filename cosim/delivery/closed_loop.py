@@ -14,10 +14,9 @@ import numpy as np
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.filters import lowpass
 from cosim.estimation.neighbours import as_inputs
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import PROTOCOL_HZ, Array
 from cosim.estimation.set_point import set_point
 from cosim.master.simulate import simulate
 from cosim.support.errors import StepError
@@ -93,7 +92,7 @@ def compare(simulated: Recording, recording: Recording) -> LoopError:
     """RMS of the differences at the recording's rows, both sides low-passed alike."""
     count, dt = min(len(simulated), len(recording)), recording.sample_time
     inside = slice(int(LEAD / dt), count - int(TAIL / dt))
-    both = {n: lowpass(simulated[n][:count] - recording[n][:count], dt, CUTOFF)[inside] for n in ("tau", "q")}
+    both = {n: lowpass(simulated[n][:count] - recording[n][:count], dt, PROTOCOL_HZ)[inside] for n in ("tau", "q")}
     return LoopError(rms(both["tau"]), rms(both["q"]))
 
 
@@ -157,7 +156,7 @@ class Loops:
         self, plant: Path, controller: Path, mount: Mount, set_points: Sequence[Future[dict[str, Array]]]
     ) -> list[Recording]:
         reading = "q_recorded" if any(mount.of_kind(ClockEffect)) else "q"
-        fed = [as_inputs(one, mount, CUTOFF) for one in self._recordings]
+        fed = [as_inputs(one, mount, PROTOCOL_HZ) for one in self._recordings]
         return [
             close_loop(
                 *(plant, controller, self._card, one),

@@ -21,8 +21,8 @@ from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
 from cosim.diagnosis.measure.findings import broadband_finding
-from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.neighbours import as_inputs
+from cosim.estimation.prepare import PROTOCOL_HZ
 from cosim.fmi.domain import KEY, Domain, entries_of
 from cosim.support.files import check_free, directory, replacing, sha256
 from cosim.support.plain import JsonObject
@@ -326,7 +326,7 @@ def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improv
     model = card.plant().model()
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
-    fed = as_inputs(heldout, card.plant(), CUTOFF)
+    fed = as_inputs(heldout, card.plant(), PROTOCOL_HZ)
     stimulus, origin = of_recording(fed, model), related_of(card, model.name)
     three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
     with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*origin, *related)), stimulus)

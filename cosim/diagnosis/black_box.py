@@ -22,6 +22,7 @@ from scipy.interpolate import BPoly, make_interp_spline
 from cosim.data.recording import Recording
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.fit import fit
+from cosim.estimation.identify.machine import LONGEST_SUBSTEP
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Piece, choose_cutoff, prepare
 from cosim.fmi.alias import Alias
@@ -37,7 +38,6 @@ from pyfmi_models.controller_section import ControllerSection
 from pyfmi_models.export import export_fmu
 from pyfmi_models.mount import Mount
 
-LONGEST_TICK = 1e-4
 SET_POINT = ("q_d", "v_d", "a_d")
 TRIAL = 5.0
 """Seconds of the first recording on which a loop is tried."""
@@ -148,7 +148,7 @@ class _Follower:
 
     def run(self, piece: Piece) -> tuple[Array, Array]:
         """Let the FMU follow a motion; return its error and its torque at the rows of the piece."""
-        per_row = ceil(piece.dt / LONGEST_TICK)
+        per_row = ceil(piece.dt / LONGEST_SUBSTEP)
         step, before = piece.dt / per_row, ceil(APPROACH / piece.dt)
         ticks = (before + len(piece.t) - 1) * per_row + 1
         signals = _path(piece, step, before * per_row, ticks, self.start)
@@ -187,7 +187,7 @@ def _start(box: BlackBox) -> float:
         components={"plant": box.fmu},
         wires=[Wire("none", "plant.tau")],
         records={"q": Record("plant.q")},
-        step=LONGEST_TICK,
+        step=LONGEST_SUBSTEP,
         ticks=1,
         signals={"none": np.zeros(1)},
         variables={"plant": box.variables},

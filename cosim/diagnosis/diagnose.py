@@ -25,7 +25,6 @@ from cosim.diagnosis.measure.findings import accepted, broadband_entry, measured
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.measure.loop_bias import loop_bias
 from cosim.diagnosis.measure.protocol import (
-    CUTOFF,
     Structures,
     band_of,
     heldout_rms,
@@ -57,7 +56,7 @@ from cosim.estimation.end_stops import pushes, without
 from cosim.estimation.fit import Fit
 from cosim.estimation.half_sample import are_even, moved, torque_late
 from cosim.estimation.not_determined import not_determined
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import inside
 from cosim.estimation.row_weights import weights
@@ -247,7 +246,7 @@ def _problem(train: Sequence[Recording], card: Card) -> Problem:
 def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Recording]) -> Answer:
     """Prove, measure what is left, decide."""
     prepared = prepare(heldout, comparison.problem.prepared.band)
-    held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
+    held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, PROTOCOL_HZ))
     examined, proof = prove_sets(comparison, examined, held)
     found = nameless(comparison, examined, proof, held)
     return Answer(comparison, examined.base, held, found, scores_of(comparison, found, held))

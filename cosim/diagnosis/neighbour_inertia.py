@@ -13,10 +13,10 @@ from math import sqrt
 import numpy as np
 
 from cosim.data.neighbours import Neighbour
-from cosim.diagnosis.terms.own_torque import CREEP
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.neighbours import key
 from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.row_weights import CLEAR_MOTION
 from cosim.support.statistics import column_rms
 
 LEAST_ROWS = 3
@@ -47,7 +47,7 @@ def inertia_with_neighbours(prepared: Prepared, turns: bool) -> tuple[float, flo
 def _own(prepared: Prepared, turns: bool) -> Iterator[Array]:
     """Shapes of this axis, the acceleration first."""
     v = prepared.stacked("v")
-    yield from (prepared.stacked("a"), np.tanh(v / (CREEP * np.abs(v).max() + 1e-300)), v, np.ones_like(v))
+    yield from (prepared.stacked("a"), np.tanh(v / (CLEAR_MOTION * np.abs(v).max() + 1e-300)), v, np.ones_like(v))
     yield from _weight(prepared.stacked("q")) if turns else ()
 
 

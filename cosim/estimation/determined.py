@@ -36,8 +36,6 @@ EXACT = 1e-4
 """Least residual, relative to the torque: no torque is recorded more exactly."""
 INSIDE = 0.5
 """Share of its way to a bound that another number may go along with one that is taken off its bound."""
-AT_BOUND = 1e-6
-"""Distance from a bound, relative to the card's number, within which a fit has ended there."""
 
 
 @dataclass(frozen=True)
@@ -103,13 +101,18 @@ def _at_bounds(problem: Problem, mount: Mount) -> dict[str, tuple[float, float]]
     card = {variable.name: variable.start for variable in problem.mount.parameters()}
     edges, ended = edges_of(mount, problem.prepared.pieces), {}
     for variable in mount.parameters():
-        name, value = variable.name, variable.start
-        if _is_of_base(name) and name in card and name in edges and name not in problem.held:
-            margin = AT_BOUND * max(abs(card[name]), abs(value))
-            for edge in edges[name]:
-                if abs(value - edge) <= margin < abs(card[name] - edge):
-                    ended[name] = edge, card[name]
+        name = variable.name
+        is_asked = _is_of_base(name) and name in card and name in edges and name not in problem.held
+        edge = ended_at(variable.start, card[name], edges[name]) if is_asked else None
+        if edge is not None:
+            ended[name] = edge, card[name]
     return ended
+
+
+def ended_at(value: float, start: float, bounds: Sequence[float]) -> float | None:
+    """The bound at which a fit ended that did not start there, to within a millionth of the number."""
+    margin = 1e-6 * max(abs(start), abs(value))
+    return next((edge for edge in bounds if abs(value - edge) <= margin < abs(start - edge)), None)
 
 
 def _is_of_base(name: str) -> bool:

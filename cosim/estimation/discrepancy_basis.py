@@ -19,15 +19,13 @@ from pyfmi_models.mount import Mount
 
 Index = npt.NDArray[np.int64]
 
-STOPS = 8
-
 
 def stop_distances(prepared: Prepared) -> Array:
-    """Slip distances from a few resolvable steps to a fifth of the motion, evenly in the logarithm."""
+    """Eight slip distances from a few resolvable steps to a fifth of the motion, evenly in the logarithm."""
     low, high = prepared.ranges["q"]
     steps = np.concatenate([np.abs(np.diff(piece.q)) for piece in prepared.pieces])
     smallest = max(float(np.median(steps)), 1e-6 * (high - low))
-    return np.geomspace(smallest / 3, (high - low) / 5, STOPS)
+    return np.geomspace(smallest / 3, (high - low) / 5, 8)
 
 
 def stop_operators(piece: Piece, distances: Array) -> Array:

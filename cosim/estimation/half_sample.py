@@ -19,13 +19,12 @@ from cosim.estimation.filters import derivative
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import JITTER
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import NO_BETTER
 
 LEAST, MOST = 0.3, 0.65
 """Rows by which such a stamp is off; no way of logging makes less, and more is a delay (`effects.delay_and_lag`)."""
 SURE = 10.0
 """Standard errors by which it must differ from zero; they are those of a few blocks. Unit: 1."""
-GAIN = 0.01
-"""Share of the residual's energy that it must explain: what is missing in a model can look late by chance."""
 
 
 def torque_late(problem: Problem, base: Fit) -> float:
@@ -43,7 +42,7 @@ def torque_late(problem: Problem, base: Fit) -> float:
     left = residual - scaled @ found
     error = float(np.sqrt(covariance(scaled, left, Blocks.of(problem.prepared))[0, 0]))
     late = float(found[0] / max(size[0], 1e-300))
-    is_sure = abs(found[0]) > SURE * error and left @ left < (1 - GAIN) * (residual @ residual)
+    is_sure = abs(found[0]) > SURE * error and left @ left < (1 - NO_BETTER) * (residual @ residual)
     rows = abs(late) / problem.sample_time
     return late if is_sure and LEAST < rows < MOST else 0.0
 

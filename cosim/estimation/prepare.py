@@ -29,6 +29,8 @@ from cosim.support.statistics import rms
 
 Array = npt.NDArray[np.float64]
 CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
+PROTOCOL_HZ = 30.0
+"""Band in which held-out errors are given and recordings are compared with simulations, unless it is mostly noise."""
 NOISE_SHARE = 0.003
 JITTER = 1e-3
 """RMS jitter, relative to the sample time, above which samples are interpolated to an even grid."""

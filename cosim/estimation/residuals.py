@@ -10,8 +10,8 @@ from pyfmi_models.mount import Mount
 
 LEAST_REMOVED = 0.02
 """Share of the energy below which it says nothing where it is removed: what is slow and small removes as little."""
-
-
+NO_BETTER = 0.01
+"""Share of an error by which a model is no better: a larger one leaves less by chance. Unit: 1."""
 LEAST_AT_REST = 10
 """Rows at rest below which nothing is concluded from them."""
 

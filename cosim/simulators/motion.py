@@ -6,12 +6,10 @@ from math import pi
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.estimation.prepare import Prepared, choose_cutoff, prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, Prepared, choose_cutoff, prepare
 from pyfmi_models.friction.base import each_way
 from pyfmi_models.mount import Mount
 
-CUTOFF = 30.0
-"""Edge of the low-pass of torques that are compared [Hz]; as in every diagnosis."""
 SECONDS, RATE = 40.0, 500.0
 """Length [s] and sample rate [Hz] of the motion where there is no recording."""
 PERIODS = (20.0, 3.7)
@@ -31,7 +29,7 @@ class Compared:
 
 def along_recording(recording: Recording, mount: Mount) -> Compared:
     """The motion of a recording, in the band that its noise leaves, at most 30 Hz."""
-    cutoff = min(CUTOFF, choose_cutoff([recording], float(mount.axis.inertia)))
+    cutoff = min(PROTOCOL_HZ, choose_cutoff([recording], float(mount.axis.inertia)))
     return Compared(prepare([recording], cutoff), recording.name, True)
 
 
@@ -44,7 +42,7 @@ def along_default(mount: Mount) -> Compared:
     recording = Recording.of({"t": t, "q": q, "tau": float(mount.axis.inertia) * np.gradient(v, t)}, "default motion")
     unit = "rad/s" if mount.motion == "rotary" else "m/s"
     name = f"two sines of {PERIODS[0]:g} s and {PERIODS[1]:g} s, up to {top:.3g} {unit}"
-    return Compared(prepare([recording], CUTOFF), name, False)
+    return Compared(prepare([recording], PROTOCOL_HZ), name, False)
 
 
 def top_speed(mount: Mount) -> float:

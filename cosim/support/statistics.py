@@ -9,6 +9,12 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Z95 = 1.96
 """Standard errors on either side of an estimate that hold 95 % of a normal distribution."""
+NORMAL_MEDIAN = 0.6744897501960817
+"""Median of the absolute value of a normal variable, relative to its standard deviation."""
+MIDDLE = (0.025, 0.975)
+"""Quantiles between which 95 % lie."""
+ROUNDING = 1e-12
+"""Change of a column, relative to its largest value, that rounding of numbers and filters may make of a constant."""
 SURELY = 3.0
 """Standard errors from which a number surely differs: noise alone comes to that once in 370."""
 
@@ -16,6 +22,11 @@ SURELY = 3.0
 def rms(values: npt.NDArray[np.floating]) -> float:
     """Root of the mean square; NaN of nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
+
+
+def robust_rms(values: npt.NDArray[np.floating]) -> float:
+    """RMS of normal values, told by their median size: a few large ones do not move it."""
+    return float(np.median(np.abs(values))) / NORMAL_MEDIAN
 
 
 def column_rms(columns: npt.NDArray[np.floating]) -> Array:
@@ -42,5 +53,5 @@ def bootstrap_range(
     Reference: Efron, Tibshirani, An Introduction to the Bootstrap (1993), chapter 13.
     """
     drawn = np.random.default_rng(seed).integers(0, count, (draws, count))
-    low, high = np.nanquantile(statistic(drawn), (0.025, 0.975))
+    low, high = np.nanquantile(statistic(drawn), MIDDLE)
     return float(low), float(high)

@@ -9,10 +9,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.diagnosis.terms.learn import Learned, learn
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -84,7 +83,7 @@ def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
     return (
         comparison,
         base,
-        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered(),
+        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, PROTOCOL_HZ)).as_delivered(),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, has, of_both_ways, span_of
 from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted
@@ -48,8 +49,6 @@ FEW = 10
 """Evaluations of each of several starts, in the recording that turns most, of which the best go on in all of them."""
 ROUGH = 6
 """Evaluations of a fit without the play: what it leaves only tells where to begin."""
-GOES_ON = 5.0
-"""Evidence [nats] from which a fit with a play goes on: of true ones the first fits have some hundred."""
 BEST = 4
 """Plays on that grid that become candidates."""
 WINDOWS = (0.1, 0.03, 0.0)
@@ -57,11 +56,6 @@ WINDOWS = (0.1, 0.03, 0.0)
 second late fits worse than no play, so without it the neighbours of the true play on the grid look like any other."""
 LITTLE = 0.1
 """Share of the base's viscous friction behind the play, by its own level: the other one that is looked for."""
-FINER = 7
-"""Steps of a finer grid, from one neighbour of the best on the coarser one to the other."""
-
-CONCEALED = 6
-"""Gaps that are concealed."""
 
 
 class Play(Hypothesis[Backlash]):
@@ -99,12 +93,15 @@ class Play(Hypothesis[Backlash]):
             yield Candidate("backlash", (middling,), (), start)
 
     def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
-        """Go on from gaps around the one that was found (whether a flank is met jumps with the gap), then from more."""
+        """Go on from gaps around the one that was found (whether a flank is met jumps with the gap), then from more.
+
+        Where there is clear evidence already: of true plays the first fits have some hundred nats.
+        """
         others = [one for one in self._first(problem, found) if one.gap_rad != start.gap_rad]
         rough = in_most_turns(problem)
         ends = [found, _shared(problem, found, evidence), *(restarted(rough, found, one, FEW) for one in others)]
         found = max(ends, key=evidence)
-        if evidence(found) <= GOES_ON:
+        if evidence(found) <= POLICY.clear:
             return found
         for end in _apart([one for one in ends if evidence(one) > 0], evidence)[:TWO]:
             play: Any = end.mount.effects[-1]
@@ -130,7 +127,7 @@ class Play(Hypothesis[Backlash]):
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """Gaps all over the range, with what stops the far side as the likeliest candidate has it."""
         for first in tried[:1]:
-            for gap in (np.geomspace(GAPS[0], GAPS[-1], CONCEALED) * span.reach).tolist():
+            for gap in (np.geomspace(GAPS[0], GAPS[-1], 6) * span.reach).tolist():
                 yield with_numbers(first, gap_rad=gap)
 
     def shows(self, effect: Backlash, mount: Mount, prepared: Prepared) -> bool:
@@ -214,7 +211,7 @@ def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) 
 def _around(values: Array, middle: float) -> Array:
     """From one neighbour of a value on a geometric grid to the other."""
     step = float(values[1] / values[0])
-    return np.geomspace(middle / step, middle * step, FINER)
+    return np.geomspace(middle / step, middle * step, 7)
 
 
 def _alike(columns: Array, span: Span, window: float = 0.0) -> Array:

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, has
 from cosim.diagnosis.effects.tuning import refound
@@ -27,10 +28,6 @@ SOFTER = (0.1, 4.0)
 """... and how much softer than that a fit may start."""
 MOST_DAMPING = 0.2
 """Damping ratio above which a spring is none: joints of machines have 0.01 to 0.1 (Ewins, Modal Testing, 2000)."""
-LEAST_INERTIAL = 0.9
-"""Share, in size, of what a spring in front of the axis adds that must come from acceleration. The rest is friction
-that turns round, where a law errs in the same way: at 0.02 and at 0.77 springs were found that are not there,
-machines with one have 1.0."""
 SLOWER = (1.0, 0.6)
 """Antiresonances, relative to the start's, from which a spring is tried again, with a smaller mass on it: a fit does
 not cross a peak."""
@@ -100,12 +97,16 @@ class LoadSideSpring(Hypothesis[LoadSideCompliance]):
         return f"with a resonance below {seen.high:.3g} Hz; not testable above"
 
     def is_degenerate(self, problem: Problem, effect: LoadSideCompliance) -> bool:
-        """What is damped that much does not spring; what shows in friction and hardly in acceleration is friction."""
+        """What is damped that much does not spring; what shows in friction and hardly in acceleration is friction.
+
+        In friction that turns round a law errs as a spring does: where .02 and .77 of what is added came from
+        acceleration, springs were found that are not there; machines with one have 1.0.
+        """
         if effect.damping_ratio > MOST_DAMPING:
             return True
         bare = replace(problem.mount, friction=Frictionless(), effects=())
         whole, inertial = (_added(problem, mount, effect) for mount in (problem.mount, bare))
-        return inertial < LEAST_INERTIAL * whole
+        return inertial < POLICY.nearly_all * whole
 
 
 def _spring(hertz: float, share: float) -> Compliance:

@@ -17,8 +17,6 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.mount import Mount
 
-LEVEL = 0.5
-"""Share of the rows whose torque is no larger than what a contact may hold."""
 SOFTER = (4.0, 16.0)
 """How many times softer than the start a bending contact is tried."""
 
@@ -39,7 +37,7 @@ class BendingContact(Hypothesis[Presliding]):
         if mount.friction.key == "none" or mount.law.states():
             return
         # Where the contact only bends, a fitted level is nothing: the torque tells how strong it is at least.
-        level = max(contact_level(mount), float(np.quantile(np.abs(span.tau), LEVEL)))
+        level = max(contact_level(mount), float(np.median(np.abs(span.tau))))
         for reach in np.geomspace(1e-4, 1.0, 9) * span.reach:
             bent = Presliding(sigma0=level / float(reach))
 

@@ -9,10 +9,11 @@ import numpy as np
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen
 from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
-from cosim.diagnosis.effects.tuning import LEAST_GAIN, at_bound, freed
+from cosim.diagnosis.effects.tuning import at_bound, freed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import NO_BETTER
 from pyfmi_models.effects import Effect, StribeckEffect
 from pyfmi_models.friction.base import LEAST_VS
 from pyfmi_models.mount import Mount
@@ -102,5 +103,5 @@ def _shaped(problem: Problem, found: Fit) -> Fit:
     sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
     best = min((found, problem.fit(sharper, 36)), key=problem.error)
     free = freed(problem, best, "delta")
-    better = problem.error(free) * (1 + LEAST_GAIN) < problem.error(best)
+    better = problem.error(free) * (1 + NO_BETTER) < problem.error(best)
     return free if better and not at_bound(free.mount.effects[-1]) else best

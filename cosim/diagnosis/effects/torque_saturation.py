@@ -13,9 +13,6 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.mount import Mount
 
-HALF = 0.5
-"""Slope past the knee of a middling one."""
-
 
 class Saturation(Hypothesis[TorqueSaturation]):
     """Less torque above a knee."""
@@ -44,7 +41,7 @@ class Saturation(Hypothesis[TorqueSaturation]):
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """Half of what is asked for past each knee."""
-        return [of_that_size(one, slope=HALF) for one in tried]
+        return [of_that_size(one, slope=0.5) for one in tried]
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Lower knees, past which half of what is asked for comes."""

@@ -11,13 +11,10 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.least_squares import ENOUGH
 from cosim.estimation.priors import is_linear
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import NO_BETTER
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Recorded, Variable, parameters_of
 
-LEAST_GAIN = 0.01
-"""A whole number of cycles is taken if the residual grows by less than this share, a free shape if it falls by more."""
-ROUNDING = 1e-9
-"""A fit comes to an end of a range up to rounding: -0.9499999999999998 is at -0.95."""
 ANY = Recorded(inf, inf)
 """Where no recording limits what a fit may find."""
 DEAD = 0.1
@@ -46,10 +43,11 @@ def ended_sizes(effect: Effect, sizes: Sequence[str], recorded: Recorded = ANY) 
 
 
 def _ends(effect: Effect, variable: Variable, recorded: Recorded) -> bool:
+    """Whether a number is at an end of its range, up to rounding: -0.9499999999999998 is at -0.95."""
     low, high = effect.fit_bounds(variable, recorded)
     value = variable.start
-    is_low = value <= low or isclose(value, low, rel_tol=ROUNDING)
-    return value >= high or isclose(value, high, rel_tol=ROUNDING) or (low != 0 and is_low)
+    is_low = value <= low or isclose(value, low)
+    return value >= high or isclose(value, high) or (low != 0 and is_low)
 
 
 def refound(
@@ -86,7 +84,7 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
     for cycles in (*whole, ripple.cycles_per_rev):
         effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
         settled = problem.fit(replace(best.mount, effects=effects), 24)
-        if problem.error(settled) < problem.error(best) * (1 + LEAST_GAIN):
+        if problem.error(settled) < problem.error(best) * (1 + NO_BETTER):
             return settled
     return found
 
@@ -100,7 +98,7 @@ def in_whole_cycles(problem: Problem, found: Fit, waves: int) -> Fit:
         return found
     moved = [replace(one, cycles_per_rev=one.cycles_per_rev / cycles * whole) for one in ripple]
     settled = problem.fit(replace(found.mount, effects=(*found.mount.effects[:-waves], *moved)), 24)
-    return settled if problem.error(settled) < problem.error(found) * (1 + LEAST_GAIN) else found
+    return settled if problem.error(settled) < problem.error(found) * (1 + NO_BETTER) else found
 
 
 def freed(problem: Problem, found: Fit, name: str) -> Fit:

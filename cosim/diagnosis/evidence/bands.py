@@ -6,6 +6,7 @@ What is slow and what is fast are then different rows of one regression: a wande
 resonance, and the many rows of encoder noise do not hide a weight out of balance.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -152,10 +153,13 @@ class NoiseOverSpeed:
         return np.asarray(np.interp(np.abs(v), self.speed, self.size))
 
 
-def noise_over_speed(residual: Array, v: Array, weight: Array) -> NoiseOverSpeed:
-    """RMS of a residual in bins of speed of equal count; at least `LEAST_SCALE` of the median over speeds."""
-    speed, counted = np.abs(v), np.flatnonzero(weight > 0)
-    parts = [p for p in np.array_split(counted[np.argsort(speed[counted])], SPEED_BINS) if len(p)]
+def noise_over_speed(
+    residual: Array, v: Array, size: Callable[[Array], float] = rms, most: float = np.inf
+) -> NoiseOverSpeed:
+    """Size of a residual in bins of speed of equal count, from `LEAST_SCALE` to `most` of the median over speeds."""
+    speed = np.abs(v)
+    parts = [part for part in np.array_split(np.argsort(speed), SPEED_BINS) if len(part)]
     centre = np.array([float(np.median(speed[part])) for part in parts])
-    size = np.array([rms(residual[part]) for part in parts])
-    return NoiseOverSpeed(centre, np.maximum(size, LEAST_SCALE * float(np.median(size)) + 1e-300))
+    sizes = np.array([size(residual[part]) for part in parts])
+    typical = float(np.median(sizes)) + 1e-300
+    return NoiseOverSpeed(centre, np.clip(sizes, LEAST_SCALE * typical, most * typical))

@@ -95,8 +95,9 @@ class Comparison:
             if share > best.get(form, (0.0,))[0]:
                 best[form] = share, columns
         everything = np.column_stack([known, *(columns * counted[:, None] for _, columns in best.values())])
-        noise = noise_over_speed(projected(base.residual * counted, everything), prepared.stacked("v"), weight)
-        bands = Bands.of(prepared, weight, noise.at(prepared.stacked("v")), policy)
+        left, v, rows = projected(base.residual * counted, everything), prepared.stacked("v"), weight > 0
+        noise = noise_over_speed(left[rows], v[rows])
+        bands = Bands.of(prepared, weight, noise.at(v), policy)
         # A base that lacks much may be left with no inertia; then the card knows better what noise there is.
         inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
         floor = bands.least_noise(prepared, inertia, policy)

@@ -40,8 +40,6 @@ AMPLIFIED = 2.0
 no noise."""
 BASE = "base"
 """Name of the nuisances that are the base's own numbers, the last ones."""
-POINTS = 500
-"""Frequencies at which noise is added up."""
 LEAST_BEYOND = 0.1
 """Share of an energy that is never put down to noise."""
 
@@ -214,7 +212,7 @@ def reading_noise(prepared: Prepared, mount: Mount) -> float:
     """
     total, rows, inertia = 0.0, 0, float(mount.axis.inertia)
     for piece in prepared.pieces:
-        hertz = np.linspace(0.0, 0.5 / piece.dt, POINTS)
+        hertz = np.linspace(0.0, 0.5 / piece.dt, 500)
         density = reading_torque(hertz, prepared, inertia) * piece.reading_noise
         total += len(piece.t) * float(np.trapezoid(2 * density**2, hertz))
         rows += len(piece.t)

@@ -12,9 +12,6 @@ from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from pyfmi_models.mount import Mount
 
-MOST = 1e300
-"""Largest variance that can still be divided by the product of two errors."""
-
 
 @dataclass(frozen=True)
 class Structure:
@@ -30,9 +27,9 @@ class Structure:
         """Independent changes of some fitted numbers, each of one standard error: (len(which), len(which)).
 
         A number of which training says nothing, as of a spot that a fit has sent far away, has no finite error: it
-        counts as one of 1e150, which beside derivatives of nothing is nothing.
+        counts as one of 1e150, which beside derivatives of nothing is nothing, and whose square can be divided by.
         """
-        spread = np.nan_to_num(self.spread[np.ix_(which, which)], nan=0.0, posinf=MOST, neginf=-MOST).clip(-MOST, MOST)
+        spread = np.nan_to_num(self.spread[np.ix_(which, which)]).clip(-1e300, 1e300)
         scale = np.sqrt(np.maximum(np.diag(spread), 1e-300))
         size, axes = np.linalg.eigh(spread / np.outer(scale, scale))
         return np.asarray(scale[:, None] * axes * np.sqrt(np.maximum(size, 0)))

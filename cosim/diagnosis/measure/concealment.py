@@ -22,7 +22,7 @@ import numpy as np
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.effects.candidates import Candidate, Span, columns_of
 from cosim.diagnosis.evidence.comparison import Comparison, aside_for
-from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
+from cosim.diagnosis.evidence.marginal import ROUNDS, Group, Marginal, marginal
 from cosim.diagnosis.search.admissibility import is_degenerate, needs_turns
 from cosim.diagnosis.search.stages import least
 from cosim.estimation.fit import Fit
@@ -33,9 +33,6 @@ from cosim.support.statistics import column_rms, rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
-
-ROUNDS = 3
-"""How often noise and sizes are estimated anew once an effect is concealed; they start from the recordings' own."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +141,7 @@ class Concealment:
         free[: len(found.free)] = trust(found, self._comparison.problem.prepared.reach)
         free[len(free) - len(prior) :] = prior
         chosen = grams[:, rows][:, :, rows]
-        rounds = {} if start is None else {"rounds": ROUNDS}
+        rounds = {} if start is None else {"rounds": ROUNDS // 2}  # noise and sizes start from the recordings' own
         return marginal(chosen, free, groups, bands.count, bands.effective, self._comparison.floor, start, **rounds)
 
 

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis.evidence.bands import noise_over_speed
 from cosim.estimation.prepare import Array
 from cosim.estimation.row_weights import CLEAR_MOTION
-from cosim.support.statistics import rms
+from cosim.support.statistics import rms, robust_rms
 
 Mask = npt.NDArray[np.bool_]
 Spans = tuple[tuple[float, float], ...]
@@ -34,13 +35,9 @@ LEAST_LOUD = 3.0
 """Loud is at least this many times the noise."""
 MOST = 3.0
 """... and one cell says no more for it than this times log(loud): one spike is no span."""
-SPEEDS = 8
-"""Bins of speed, of equal count, in which noise is measured."""
-LEAST, MOST_NOISE = 0.2, 3.0
-"""Noise at one speed differs from that at the others by no more than these factors: few moves are that fast, and what
-is missing may be in most of them."""
-MEDIAN = 0.6745
-"""Median of the absolute value of a normal variable of unit standard deviation."""
+MOST_NOISE = 3.0
+"""Noise at one speed is no larger than this times that at the others: few moves are that fast, and what is missing may
+be in most of them."""
 ROUNDS = 20
 
 
@@ -60,11 +57,7 @@ class Residual:
 
 def noise_at(speed: Array, residual: Array, wanted: Array) -> Array:
     """Standard deviation of a residual at the wanted speeds, from medians in bins of equal count."""
-    parts = [part for part in np.array_split(np.argsort(np.abs(speed)), SPEEDS) if len(part)]
-    centres = [float(np.median(np.abs(speed[part]))) for part in parts]
-    sizes = np.array([float(np.median(np.abs(residual[part]))) / MEDIAN for part in parts])
-    typical = float(np.median(sizes)) + 1e-300
-    return np.asarray(np.interp(np.abs(wanted), centres, np.clip(sizes, LEAST * typical, MOST_NOISE * typical)))
+    return noise_over_speed(residual, speed, robust_rms, MOST_NOISE).at(wanted)
 
 
 def flagged(residuals: Sequence[Residual]) -> list[Spans]:

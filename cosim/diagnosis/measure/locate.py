@@ -25,9 +25,8 @@ MOVE = 1.0
 """Seconds of a move that are ascribed to the rest before it."""
 LEAST_REST = 0.1
 """Shorter standstill [s] is a reversal."""
-OCTAVES = 0.5
-LOWEST, HIGHEST = 0.5, 32.0
-"""Hz: the bands of frequency, half an octave each."""
+BANDS = np.geomspace(0.5, 32.0, 13)
+"""Edges of the bands of frequency [Hz], half an octave each."""
 UNITS = {"temperature": "°C", "load_torque": "N.m"}
 """Units of user columns that have one; of others nothing is known."""
 
@@ -76,14 +75,13 @@ def _of_friction(traces: Sequence[Trace], missing: Array) -> Iterator[Axis]:
 def _of_frequency(traces: Sequence[Trace], missing: Array) -> Iterator[Region]:
     """RMS of the missing torque in bands of half an octave; its band from the segments of all recordings."""
     ends = np.cumsum([len(t.t) for t in traces])[:-1]
-    edges = np.exp2(np.arange(np.log2(LOWEST), np.log2(HIGHEST) + OCTAVES / 2, OCTAVES))
-    parts = [_powers(t.t, one, edges) for t, one in zip(traces, np.split(missing, ends), strict=True)]
+    parts = [_powers(t.t, one, BANDS) for t, one in zip(traces, np.split(missing, ends), strict=True)]
     powers = np.concatenate(parts)
     if len(powers) > 2:
         size = np.sqrt(powers.mean(0))
         band = Z95 * powers.std(0, ddof=1) / np.sqrt(len(powers)) / (2 * size + 1e-300)
         count = np.full(len(size), float(len(powers)))
-        centres = np.sqrt(edges[1:] * edges[:-1])
+        centres = np.sqrt(BANDS[1:] * BANDS[:-1])
         named = {"axis": "frequency", "unit": "Hz", "measure": "RMS of the missing"}
         yield Region(**named, centres=centres, mean=size, band=band, count=count)
 

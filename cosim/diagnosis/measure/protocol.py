@@ -20,13 +20,11 @@ from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Band, Piece, Prepared, prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, Array, Band, Piece, Prepared, prepare
 from cosim.estimation.residuals import inside, kept, residuals
 from cosim.estimation.row_weights import least_speed
 from cosim.support.statistics import Z95, rms
 from pyfmi_models.mount import Mount
-
-CUTOFF = 30.0
 
 
 @dataclass(frozen=True)
@@ -72,9 +70,9 @@ def judged_band(recordings: Sequence[Recording], models: Structures, band: Band)
 
 def _judged(recordings: Sequence[Recording], models: Structures, band: Band) -> tuple[Prepared, Prepared]:
     """Recordings in the band that is judged, and in that of the analysis."""
-    both = prepare(recordings, band), prepare(recordings, CUTOFF)
+    both = prepare(recordings, band), prepare(recordings, PROTOCOL_HZ)
     own, protocol = ([rms(inside(one, mount)) ** 2 for mount in (models.before, models.after)] for one in both)
-    is_above = band.cutoff > CUTOFF and own[0] > 2 * protocol[0]
+    is_above = band.cutoff > PROTOCOL_HZ and own[0] > 2 * protocol[0]
     return both[0] if is_above or is_noise(own, protocol) else both[1], both[0]
 
 
@@ -83,7 +81,7 @@ def band_of(held: HeldOut) -> Band:
     return Band(held.cutoff_hz, held.motion_hz)
 
 
-def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = CUTOFF) -> float:
+def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = PROTOCOL_HZ) -> float:
     """RMS of the torque residual of one model by the protocol, in its band or another [Hz]."""
     return rms(inside(prepare(recordings, band), mount))
 
@@ -122,7 +120,7 @@ def of_the_best(interval: tuple[float, float], value: float, many: int) -> tuple
 
 
 def traces(
-    train: Sequence[Recording], heldout: Sequence[Recording], models: Structures, band: float | Band = CUTOFF
+    train: Sequence[Recording], heldout: Sequence[Recording], models: Structures, band: float | Band = PROTOCOL_HZ
 ) -> tuple[Trace, ...]:
     """Signals of all recordings for pictures and for the file of missing torque, in the band that was judged."""
     prepared = [prepare([recording], band) for recording in (*train, *heldout)]

@@ -10,6 +10,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Trace
 from cosim.estimation.discrepancy_basis import since_reversal
 from cosim.estimation.prepare import Array
+from cosim.support.statistics import ROUNDING
 
 Model = Callable[[Array], Array]
 """From features (rows, features) to torque (rows,)."""
@@ -17,8 +18,6 @@ EVERY = 4
 """Rows of a trace for each row that is fitted: the trace is filtered at 30 Hz and has eight rows a period of that."""
 CENTRES, MOST_ROWS = 800, 20_000
 """Rows that a kernel is placed at, and rows that it is fitted to."""
-ROUNDING = 1e-12
-"""Spread of a feature, relative to its size, below which it is constant but for rounding. Unit: 1."""
 RIDGE = 1e-2
 """Added to the diagonal, relative to the mean of the normal matrix. Unit: 1."""
 CHUNK = 256

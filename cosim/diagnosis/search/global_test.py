@@ -29,8 +29,6 @@ DRAWS = 199
 """Nulls; the smallest p that can be told is one in 200."""
 AT_ONCE = 32
 """Nulls that are made together: all of a long recording take more memory than the recording."""
-LEAST_SIZE = 1e-100
-"""Size of a column that is nothing, for which any coefficient would do."""
 ALPHA = 0.05
 """Share of the nulls above the threshold that is told."""
 
@@ -113,6 +111,6 @@ def _groups(tried: Sequence[Candidate], columns: Sequence[Array], torque: float)
     first = 0
     for one, own, form in zip(tried, columns, forms, strict=True):
         size = column_rms(own)
-        prior = np.ones(own.shape[1]) if one.finite else 0.5 * torque / np.maximum(size, LEAST_SIZE)
+        prior = np.ones(own.shape[1]) if one.finite else 0.5 * torque / np.maximum(size, 1e-100)
         yield np.arange(first, first + own.shape[1]), prior, log(forms.count(form))
         first += own.shape[1]

@@ -25,7 +25,7 @@ from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.tonal_disturbance import without_tones
-from cosim.support.statistics import hann
+from cosim.support.statistics import SURELY, hann
 from pyfmi_models.effects import ActuatorLag, Delay, DriveEffect, Effect
 from pyfmi_models.mount import Mount
 
@@ -40,7 +40,7 @@ SMOOTH = 5
 """Bins over which the noise of a cross-spectrum is averaged."""
 OVERLAP = 2.0
 """Divides chi-squared: overlapping windowed segments and neighbouring bins tell the same twice."""
-DECISIVE = 9.0
+DECISIVE = SURELY**2
 """Difference of chi-squared from which one of the two is excluded (three standard errors)."""
 TOLD = 0.65
 """Share of the set point's misfit that a delay or a lag must explain."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.terms.dictionary import followed, user_columns
+from cosim.diagnosis.terms.dictionary import FEW, followed, user_columns
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
 from pyfmi_models.effects.learned_base import LearnedEffect, with_free_coefficients
@@ -24,14 +24,10 @@ from pyfmi_models.waves import INPUT
 
 WAVES = 12
 """Waves over a range: a bump of a tenth of it is still drawn."""
-FEW = 4
-"""Waves over a column beside position and speed: temperature, load; its range is seldom filled."""
 FINE = 32
 """Waves over position of a torque constant: 16 periods over the range, as magnets and teeth come many times a turn."""
 OVER_WAY = 8
 """Waves over the way travelled: one fades over a tenth of it or longer."""
-BY = (4, 2)
-"""Waves over position and over a column, in a table of products."""
 STROKES = (0.05, 0.1, 0.2, 0.4, 0.8)
 """Ways of a long hysteresis, in ranges of position."""
 WAYS = (0.003, 0.01, 0.03, 0.1)
@@ -159,7 +155,7 @@ def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
             yield _term(f"friction level over {name}", LearnedFriction, _falling(few, 0), over=over, seen=seen)
             yield _term(f"speed and {name}", LearnedViscous, _falling(few, 0), over=over, seen=seen, at_speed=top)
             if prepared.has_position:
-                waves = BY[0], resolved(BY[1], whole)
+                waves = FEW, resolved(FEW // 2, whole)
                 yield _of_products(name, {"by": over, "by_seen": seen, "waves": waves}, prepared)
 
 
@@ -173,6 +169,6 @@ def resolved(most: int, values: Array) -> int:
 
 
 def _of_products(name: str, by: Mapping[str, Any], prepared: Prepared) -> CandidateTerm:
-    sizes = [a * b for a, b in product(_falling(BY[0]), _falling(by["waves"][1]))]
+    sizes = [a * b for a, b in product(_falling(FEW), _falling(by["waves"][1]))]
     shape = {"over": "position", "seen": prepared.ranges["q"], **by}
     return _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)

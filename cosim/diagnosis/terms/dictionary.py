@@ -12,21 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.terms.own_torque import own_set_point, own_torque
 from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import recurrence
-from cosim.support.statistics import column_rms
+from cosim.support.statistics import ROUNDING, column_rms
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
 
-PRODUCT_WAVES = 4
-"""Waves over the range of positions in a product with another quantity."""
+FEW = 4
+"""Waves over a column beside position and speed, whose range is seldom filled, and over positions in its products."""
 OF_LAW = ("speed", "rate of torque")
 """Terms that say nothing of the unknown: a friction law's own misfit, and time stamps a fraction of a sample off."""
-REPEATS = 0.02
-"""Share of a column's energy that torque and motion must leave for it to be a quantity of its own."""
-ROUNDING = 1e-12
-"""Relative change of a column below which it is constant but for the rounding of numbers and filters."""
 TURN = 5e-4
 """Share of the range of positions by which a motion must come back to count as reversed."""
 
@@ -151,12 +148,12 @@ def _products(prepared: Prepared) -> dict[str, tuple[Maker, Maker]]:
 
 
 def _alone(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    waves = _waves(place(p), PRODUCT_WAVES)
+    waves = _waves(place(p), FEW)
     return [other(p), other(p) * sign(p), *waves, *(wave * sign(p) for wave in waves)]
 
 
 def _product(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    waves = _waves(place(p), PRODUCT_WAVES)
+    waves = _waves(place(p), FEW)
     return [*(wave * other(p) for wave in waves), *(wave * other(p) * sign(p) for wave in waves)]
 
 
@@ -204,11 +201,14 @@ def _at_rows(prepared: Prepared, name: str) -> Array:
 
 
 def _repeats(prepared: Prepared, column: Array) -> bool:
-    """Whether a column is the torque, or the motion, under another name or in another unit: then it is no cause."""
+    """Whether a column is the torque, or the motion, under another name or in another unit: then it is no cause.
+
+    These leave nothing that matters of it.
+    """
     known = np.column_stack([*(prepared.stacked(one) for one in ("tau", "q", "v", "a")), np.ones(len(column))])
     own = column - column.mean()
     left = own - known @ np.linalg.lstsq(known, own, rcond=1e-9)[0]
-    return bool(left @ left <= REPEATS * (own @ own))
+    return bool(left @ left <= POLICY.negligible * (own @ own))
 
 
 def _centred(prepared: Prepared, name: str) -> Column:

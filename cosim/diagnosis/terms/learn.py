@@ -24,17 +24,13 @@ from cosim.diagnosis.terms.select import begun, fitted, paths
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
-from cosim.estimation.residuals import residuals
-from cosim.support.statistics import rms
+from cosim.estimation.residuals import NO_BETTER, residuals
+from cosim.support.statistics import MIDDLE, rms
 from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.mount import Mount
 
-LEAST_GAIN = 0.01
-"""Share of the held-out error that a term must remove: less is no better model, only a larger one. Unit: 1."""
 FEWER = 3
 """How often the waves of a term are halved before it is given up."""
-MIDDLE = (0.025, 0.975)
-"""Quantiles of a term's torque between which its size is told."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +171,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     worse = any(rms(new) > rms(old) for old, new in pairs)
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
     proven = gain >= comparison.policy.fair or 1 - (after / before) ** 2 >= comparison.policy.considerable
-    refused = worse or not proven or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
+    refused = worse or not proven or after > (1 - NO_BETTER) * before or interval[0] <= 0
     names = tuple(one.name for one in terms)
     return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)
 

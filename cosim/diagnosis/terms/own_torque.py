@@ -19,10 +19,9 @@ import numpy as np
 from cosim.data.roles import is_named
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.row_weights import CLEAR_MOTION
 from cosim.support.statistics import column_rms
 
-CREEP = 0.02
-"""Share of the fastest speed below which the sign of friction is not told. Unit: 1."""
 WAVES = 3
 """Waves of a load over the range of positions: a weight on half a turn, or a spring, is one and a half of them."""
 
@@ -84,7 +83,7 @@ def _asks(name: str) -> bool:
 def _motion(prepared: Prepared) -> Array:
     """What an axis' own motion may ask of its torque, (rows, n)."""
     v = prepared.stacked("v")
-    sign = np.tanh(v / (CREEP * np.abs(v).max() + 1e-300))
+    sign = np.tanh(v / (CLEAR_MOTION * np.abs(v).max() + 1e-300))
     shapes = [prepared.stacked("a"), sign, v]
     if prepared.has_position:
         low, high = prepared.ranges["q"]

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.estimation.filters import gain, noise_of
 from cosim.estimation.least_squares import squares_left
 from cosim.estimation.prepare import Array, Piece, Prepared, prepare
@@ -34,6 +35,8 @@ MOST_TAKEN = 0.6
 only assumed to be flat."""
 LEAST_ROWS = 30
 """Rows that a balance of a dozen terms needs."""
+ROWS_A_COLUMN = 10
+"""Rows for each column below which the other rooms' fits of a recording say nothing."""
 DRIFTS = 2
 """Slow waves of the friction level in each recording: half a period and more of them."""
 MOST_DRIFTING = 4
@@ -43,10 +46,8 @@ BLOCK = 0.5
 HIDDEN, OVERLOOKED = 0.3, 0.03
 """A term may hide this share of what is left, more where more of the torque is left, and this share of the whole torque
 (RMS): physics that the balance lacks."""
-ONE_WAY = 0.02
-"""Share of the rows below which a direction is not there: then offset and friction are one number ..."""
 OFFSET = 0.7
-"""... of which this share may be the offset."""
+"""Where the axis goes one way only, offset and friction are one number, of which this share may be the offset."""
 TURNS = 2.0
 """Turns of the reading from which the axis goes round."""
 CREEP = 0.03
@@ -130,9 +131,9 @@ class Balance:
 
     @cached_property
     def one_way(self) -> bool:
-        """Whether the axis moves in one direction only."""
+        """Whether the axis moves in one direction only, but for rows that do not matter."""
         v = self._rows("v")
-        return bool(min(np.mean(v > CREEP * self._top), np.mean(v < -CREEP * self._top)) < ONE_WAY)
+        return bool(min(np.mean(v > CREEP * self._top), np.mean(v < -CREEP * self._top)) < POLICY.negligible)
 
     @property
     def _turns(self) -> bool:

@@ -13,6 +13,7 @@ from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search.base_moved import FAR
 from cosim.diagnosis.trust.balance import Balance, Estimate
+from cosim.estimation.determined import ended_at
 from cosim.estimation.prepare import Array
 from cosim.plots.quantities import raised
 from cosim.support.statistics import SURELY, rms
@@ -58,7 +59,7 @@ def _far(
     """One sentence, or none."""
     side = {"positive": " forward", "negative": " backward"}.get(name.rsplit(".", 1)[-1], "")
     numbers = f"{card.start:.3g} → {value:.3g} {raised(card.unit)}"
-    if bounds and _at_bound(value, bounds, card.start):
+    if bounds and ended_at(value, card.start, bounds) is not None:
         return [
             f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands in for something else, "
             f"or these recordings do not determine it. Possible causes: {causes}."
@@ -68,12 +69,6 @@ def _far(
         return []
     how = f"{factor:.3g} times the card's" if factor > 1 else f"{1 / factor:.3g} times smaller than the card's"
     return [f"Refitted, the {words}{side} is {how} ({numbers}). Possible causes: {causes}."]
-
-
-def _at_bound(value: float, bounds: tuple[float, float], start: float) -> bool:
-    """Whether a value that did not start at a bound ended there, to within the fit's own margin."""
-    margin = 1e-6 * max(abs(start), abs(value), 1e-300)
-    return any(abs(value - edge) <= margin and abs(start - edge) > margin for edge in bounds)
 
 
 def _is_felt(name: str, before: Mapping[str, Variable], after: Mapping[str, Variable], top: float) -> bool:

@@ -19,6 +19,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.trust.balance import ROWS_A_COLUMN
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.residuals import kept
 from cosim.estimation.row_weights import weights
@@ -32,8 +33,6 @@ LEAST_SIDE, TURNS = 0.1, 2
 direction is visited on one side only, and what it lacks looks like a change."""
 WAVES = 4
 """Waves over the range of positions, and over the time in which something changes slowly."""
-LEAST_ROWS = 10
-"""Rows for each shape of C below which a recording is not asked."""
 SIGN, BENDS = 0.003, (0.02, 0.1, 0.3)
 """Speeds at which friction sets in and bends, in the fastest. Unit: 1."""
 UNITS = {
@@ -84,7 +83,7 @@ def _words(name: str, found: Change, linear: bool) -> str:
 def _change(prepared: Prepared, residual: Array, rows: Array, turns: bool) -> Change | None:
     t, q, v, a = (prepared.stacked(name)[rows] for name in "tqva")
     always, kinds = _shapes(q, v, a, turns)
-    if len(t) < LEAST_ROWS * always.shape[1]:
+    if len(t) < ROWS_A_COLUMN * always.shape[1]:
         return None
     rest = _Rest.of(always, residual[rows])
     tried = [

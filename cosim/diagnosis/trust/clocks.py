@@ -18,7 +18,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.trust.balance import Balance
+from cosim.diagnosis.trust.balance import ROWS_A_COLUMN, Balance
 from cosim.estimation.filters import between
 from cosim.estimation.least_squares import squares_left
 from cosim.estimation.prepare import Array
@@ -27,11 +27,10 @@ from cosim.estimation.row_weights import far_from_turns
 REACH, STEP = 0.060, 0.002
 """Lags that are tried [s]."""
 LAGS = np.arange(-REACH, REACH + STEP / 2, STEP)
-LATE, CERTAINLY = 0.010, 0.008
-"""A lag of so many seconds, certainly more than the latter, is more than delays and lags of most servo drives."""
-TOO_LATE, CERTAINLY_TOO_LATE = 0.018, 0.016
-"""One of so many, certainly more than the latter, is no drive's: no effect may be named beside it. Field buses and slow
-loops have 20 ms."""
+LATE = 0.010
+"""A lag of so many seconds, certainly more than one step less, is more than delays and lags of most servo drives."""
+TOO_LATE = 0.018
+"""One of so many is no drive's: no effect may be named beside it. Field buses and slow loops have 20 ms."""
 EXPLAINED = 0.8
 """Share of the torque's energy that a balance must explain to say anything of milliseconds."""
 MOST_OF_IT = 0.7
@@ -45,10 +44,6 @@ WORSE = -0.25
 """The same of the recording in which it is least: one clock is that of all, and a lag that leaves this much more of one
 is no clock's. 92 machines whose position was shifted by 20 and 40 ms have -.07 and more, two eccentric encoders, whose
 ripple looks late at one speed, -1.2 and -1.5. Unit: 1."""
-LEAST_ROWS = 10
-"""Rows for each column below which a lag is not looked for."""
-CLOCKS, CLOCKS_TOO_LATE = 0.6, 0.85
-"""Share of either kind that comes from clocks and late read-outs; the others are dead times of drives."""
 
 
 @dataclass(frozen=True)
@@ -69,17 +64,17 @@ class ClockOffset:
 
         Where what is not excluded reaches the end of what was tried, lag and viscosity were one thing.
         """
-        return self.removed >= NOT_NOTHING and self._is_beyond(LATE, CERTAINLY)
+        return self.removed >= NOT_NOTHING and self._is_beyond(LATE)
 
     @property
     def is_too_late(self) -> bool:
         """Whether the lag is no drive's, and most of what the balance leaves."""
-        return self.removed >= MOST_OF_IT and self._is_beyond(TOO_LATE, CERTAINLY_TOO_LATE)
+        return self.removed >= MOST_OF_IT and self._is_beyond(TOO_LATE)
 
-    def _is_beyond(self, lag: float, least: float) -> bool:
+    def _is_beyond(self, lag: float) -> bool:
         nearest, furthest = sorted((abs(self.low), abs(self.high)))
         certain = nearest if self.low * self.high > 0 else 0.0
-        large = abs(self.lag) > lag - STEP / 2 and certain > least - STEP / 2
+        large = abs(self.lag) > lag - STEP / 2 and certain > lag - 3 * STEP / 2
         return large and furthest < REACH - STEP / 2 and self.least_removed > WORSE
 
 
@@ -124,7 +119,7 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
         f"{names}: the position comes {span} {how}. That is more than {beyond}: check that one clock stamps both when "
         "they are sampled, or shift one of them."
     )
-    share = CLOCKS_TOO_LATE if found.is_too_late else CLOCKS
+    share = 0.85 if found.is_too_late else 0.6
     clock = Alternative(what="two clocks, or a late read-out of one signal", likelihood=share)
     causes = (clock, Alternative(what=other, likelihood=1 - share))
     return (Sanity(finding="clocks", statement=text, alternatives=causes, blocks_naming=found.is_too_late),)
@@ -133,7 +128,7 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
 def _misfit(balance: Balance) -> _Left:
     torque, columns = _shifted(balance), balance.columns(balance.own_order)
     inside = (far_from_turns(balance.prepared) > 0) & np.all(np.isfinite(torque), axis=1)
-    if inside.sum() < LEAST_ROWS * columns.shape[1]:
+    if inside.sum() < ROWS_A_COLUMN * columns.shape[1]:
         return _Left(np.ones(len(LAGS)))
     columns, torque = columns[inside], torque[inside]
     basis, triangle = np.linalg.qr(columns)

@@ -6,7 +6,7 @@
 - columns that tell the same twice: a set point beside the position, a measured speed beside its slope;
 - the sample rate, beside the card's and those of real machines; the torque limit.
 
-No single piece may say more than a `MOST_*`: each rests on a model of its own that may be wrong.
+No single piece may say more than `Policy.clear`: each rests on a model of its own that may be wrong.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.data.speeds import times_slope
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.trust.balance import Balance, Estimate
 from cosim.diagnosis.trust.explanations import ANY_FRICTION, ANY_INERTIA, Explanation
 from cosim.estimation.prepare import LEAST_SECONDS, Array
@@ -24,10 +25,6 @@ from cosim.estimation.prepare import LEAST_SECONDS, Array
 MOST_GRAVITY = 6.0
 """Nats: a ripple twice a turn, or a spring over several, can look like gravity of another order. A wave of which less
 than half a turn was seen is a spring; one that was passed in one direction only is any wave over time."""
-MOST_SIGN = 12.0
-MOST_BESIDE = 10.0
-"""Nats of a column that tells the same twice."""
-MOST_LIMIT = 8.0
 CONTRADICTS = 0.2
 """|ln| of that slope from which one of the two columns, or the time, is wrong; loops and filters are within a tenth."""
 ALIKE = 0.1
@@ -93,7 +90,7 @@ class Evidence:
         found = _gain(solution.inertia, known.inertia * torque / position, known.spread_of_inertia(explanation))
         if known.coulomb:
             found += _gain(solution.coulomb, known.coulomb * torque, known.spread_of_friction(explanation))
-        found -= float(np.logaddexp(0.0, -copysign(1.0, torque) * np.clip(solution.sign, -MOST_SIGN, MOST_SIGN)))
+        found -= float(np.logaddexp(0.0, -copysign(1.0, torque) * np.clip(solution.sign, -POLICY.clear, POLICY.clear)))
         found += (
             self._size(balance, explanation)
             + self._gravity(balance, order)
@@ -140,7 +137,7 @@ class Evidence:
         if not np.isfinite(self.reference.torque_limit) or self.reference.torque_limit <= 0:
             return 0.0
         beyond = self._largest / abs(explanation.torque) / self.reference.torque_limit / BEYOND_LIMIT
-        return -min(MOST_LIMIT, 4 * log(beyond)) if beyond > 1 else 0.0
+        return -min(POLICY.clear, 4 * log(beyond)) if beyond > 1 else 0.0
 
     @cached_property
     def _largest(self) -> float:
@@ -210,4 +207,4 @@ def _slip_likelihood(slope: float, slip: Explanation, kind: str) -> float:
     """Log-likelihood of such a slope: the slip is in one of the columns, or in both."""
     ticks = 1 / (slip.time * slip.speed) if kind == "v" else 1.0
     found = [exp(-0.5 * (log(abs(slope) / (each * ticks)) / ALIKE) ** 2) for each in {1.0, slip.position}]
-    return max(log(sum(found) / len(found) + 1e-300), -MOST_BESIDE)
+    return max(log(sum(found) / len(found) + 1e-300), -POLICY.clear)

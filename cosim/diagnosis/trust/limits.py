@@ -13,12 +13,10 @@ from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.terms.dictionary import further_columns
 from cosim.estimation.end_stops import Push
-from cosim.estimation.prepare import Prepared
+from cosim.estimation.prepare import PROTOCOL_HZ, Prepared
 from cosim.estimation.row_weights import far_from_turns
 from pyfmi_models.mount import Mount
 
-BAND = 30.0
-"""Band of the protocol [Hz]: an encoder that spoils no torque in it limits nothing that is printed."""
 SPOILED = 0.03
 """Share of the torque from which the torque that rounding alone seems to need spoils a band: the noise of good
 recordings is below a third of it, and an effect that is a tenth of the torque is three times it."""
@@ -31,12 +29,13 @@ moved for 20 s has none."""
 def encoder_step(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> tuple[Sanity, ...]:
     """Say what the step of a coarse encoder limits; nothing where rounding spoils no torque in the protocol's band.
 
+    There it limits nothing that is printed.
     `cutoff` [Hz] is the band of the analysis. Rounding to a step s is white noise of s / sqrt(12).
     """
     steps = {one.name: resolution(one["q"]) for one in recordings if "q" in one}
     name, step = max(steps.items(), key=lambda pair: pair[1], default=("", 0.0))
     coarse = next((one for one in recordings if one.name == name), None)
-    if coarse is None or rounding_torque(coarse, step, float(mount.axis.inertia), BAND) < SPOILED:
+    if coarse is None or rounding_torque(coarse, step, float(mount.axis.inertia), PROTOCOL_HZ) < SPOILED:
         return ()
     unit, size = ("mm" if mount.motion == "linear" else "mrad"), 1e3 * step
     text = (

@@ -16,10 +16,9 @@ from cosim.diagnosis.decide.decision import decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.diagnosis.terms.learn import Learned, learn
 from cosim.diagnosis.terms.select import begun, paths
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from pyfmi_models.card import parse_card, read_card
 
 
@@ -107,7 +106,7 @@ def test_no_recording_is_worse_off_than_before() -> None:
     """A night night that has less of it than the others vetoes what they propose."""
     comparison, base, _ = parts(iron)
     there = [recording(iron, 3), recording(nothing, 4)]
-    held = Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered()
+    held = Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, PROTOCOL_HZ)).as_delivered()
     found = learn(comparison, base, held)
     assert found is not None
     assert not found.helps
