@@ -58,6 +58,7 @@ def candidates(
     """List what is worth trying of `only` these effects, given the torque residual at the kept rows."""
     span = span_of(mount, prepared, residual, level)
     usable = [one for one in HYPOTHESES if prepared.has_position or not one.needs_position]
+    usable = [one for one in usable if one.may_come(mount)]
     asked = [one for one in usable if {form.id for form in one.forms} & set(only)]
     found = [candidate for one in asked for candidate in one.candidates(mount, span)]
     return [candidate for candidate in found if candidate.effect in only]

@@ -48,6 +48,10 @@ class NeighbouringAxis(Hypothesis[Neighbouring]):
     needs_position: ClassVar[bool] = False
     view = "time"
 
+    def may_come(self, mount: Mount) -> bool:
+        """Beside that of another neighbour too."""
+        return True
+
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Each neighbour: its acceleration, with its speed, and the weight that turns with it; weights behind two."""
         for one in _free(span.prepared.neighbours, mount):

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
-from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, has, of_both_ways, span_of
+from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, of_both_ways, span_of
 from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques, torques_of_grid
@@ -70,8 +70,6 @@ class Play(Hypothesis[Backlash]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """The nearest play, and the best of the grid."""
-        if has(mount, Backlash):
-            return
         law = _law(mount)
         level = max(law["Fc"], law["Fs"])  # a refitted law may put all of it in the break-away level
         ratio = float(f"{law['sigma2'] / level:.1g}") if level else 0.0

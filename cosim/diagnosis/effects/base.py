@@ -3,6 +3,7 @@
 The physics is in `pyfmi_models/effects`: equation, parameters with units and bounds, what the effect is called. Here
 stands, one file an effect, what only a diagnosis asks. In the order in which it is asked:
 
+    may_come(mount)                whether a mount may have the effect beside what it has
     candidates(mount, span)        what is worth trying, given what the recordings visit
     twins(effect)                  effects that must be tried where this one is
     renamed(effect, mount)         the same under this name, where no recording tells two names apart
@@ -113,8 +114,12 @@ class Hypothesis(Generic[Form]):
     caveat: ClassVar[str] = ""
     """What must be said beside the evidence."""
 
+    def may_come(self, mount: Mount) -> bool:
+        """Whether a mount may have the effect beside what it has: candidates are asked for only then."""
+        return not (self.is_settled(mount) or self._needs_friction(mount))
+
     def candidates(self, mount: Mount, span: Span) -> Iterable[Candidate]:
-        """What is worth trying; nothing where the mount has it already or it cannot be seen."""
+        """What is worth trying; nothing where it cannot be seen."""
         raise TypeError(f"{type(self).__name__} has no candidates")
 
     def twins(self, effect: Form) -> list[Effect]:
@@ -201,11 +206,15 @@ class Hypothesis(Generic[Form]):
         """Whether no recording can test the effect: the model has it already, or the axis cannot have it."""
         return any(isinstance(effect, self.forms) for effect in mount.effects)
 
+    def _needs_friction(self, mount: Mount) -> bool:
+        """Whether it changes a friction that the mount does not have."""
+        return mount.friction.key == "none" and any(form.place == "Friction" for form in self.forms)
+
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """Why these recordings cannot test the effect: one reason. What to record is the effect's own to say."""
         if self.is_settled(mount):
             return HELD
-        if mount.friction.key == "none" and any(form.place == "Friction" for form in self.forms):
+        if self._needs_friction(mount):
             return NO_FRICTION
         return NO_POSITION if self.needs_position and not prepared.has_position else UNSEEN
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.effects.base import Evidence, Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.diagnosis.effects.tuning import freed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
@@ -29,8 +29,6 @@ class Cable(Hypothesis[CableWrap]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """A spring whose home is where its torque vanishes: two homes span them all."""
-        if has(mount, CableWrap):
-            return
         homes = [float(home) for home in np.quantile(span.q, [0.1, 0.9])]
         for hardening in (0.0, 4.0 / span.reach**2):
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Hypothesis, Seen
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.diagnosis.effects.delay_and_lag import NOTHING_ASKED, attributed
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
@@ -31,7 +31,7 @@ class Clocks(Hypothesis[ClockSkew]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Two offsets and two drifts."""
-        if has(mount, ClockSkew) or not span.asked:
+        if not span.asked:
             return
         ways = [ClockSkew(offset_ms=ms) for ms in (1.0, 4.0)]
         # One drifts from nothing, one through nothing in the middle of a recording: together with an offset, any drift.

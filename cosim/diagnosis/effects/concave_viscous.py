@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, of_that_size
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
@@ -49,7 +49,7 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Three speeds; the curve starts straight, as the law's own line."""
-        if not hasattr(mount.friction, "sigma2") or has(mount, ConcaveViscous):
+        if not hasattr(mount.friction, "sigma2"):
             return
         for share in THINNING:
             speed = share * span.top

@@ -55,6 +55,10 @@ class LateTorque(Hypothesis[Drive]):
     is_timing: ClassVar[bool] = True
     view = "phase"
 
+    def may_come(self, mount: Mount) -> bool:
+        """A delay beside a lag too."""
+        return True
+
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Four sizes of each."""
         if not span.asked:

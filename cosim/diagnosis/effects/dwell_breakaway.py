@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Evidence, Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
@@ -54,8 +54,6 @@ class Settling(Hypothesis[DwellBreakaway]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Ages of the contact that a small or a larger slip renews."""
-        if mount.friction.key == "none" or has(mount, DwellBreakaway):
-            return
         for share in (1e-3, 4e-3):
             fresh = DwellBreakaway(torque_per_efold=0.0, onset_s=0.1, memory_rad=share * span.reach)
 

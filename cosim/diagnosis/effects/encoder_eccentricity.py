@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Cyclic, Evidence
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.diagnosis.effects.tuning import in_cycles, restarted
 from cosim.estimation.fit import Fit
@@ -35,8 +35,6 @@ class Eccentricity(Cyclic[EncoderEccentricity]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Cycles over angle of what grows with the square of the speed."""
-        if has(mount, EncoderEccentricity):
-            return
         fast = replace(span, residual=span.residual * (span.v / span.top) ** 2)
         for cycles in peaks(fast, fast.residual):
 

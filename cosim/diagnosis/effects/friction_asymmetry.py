@@ -29,7 +29,7 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
         Levels of two directions and an offset are two numbers of an axis that moves: with all three, one direction may
         lose its friction altogether, and whatever the other has is explained by a name that it is not.
         """
-        if has(mount, FrictionAsymmetry) or mount.friction.key == "none" or _is_alike(mount):
+        if _is_alike(mount):
             return
         linear = ("level_asymmetry", "viscous_asymmetry")
         neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Hypothesis, Reach, visited
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, GravityUnbalance
 from pyfmi_models.mount import Mount
@@ -22,8 +22,6 @@ class Unbalance(Hypothesis[GravityUnbalance]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Sine and cosine of the angle."""
-        if has(mount, GravityUnbalance) or mount.motion == "linear":
-            return
 
         def start(c: Array) -> Effect:
             return GravityUnbalance(mgl=hypot(*c), phase=atan2(c[1], c[0]))

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.inertia_variation import InertiaVariation
@@ -29,8 +29,6 @@ class VaryingInertia(Hypothesis[InertiaVariation]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Once to four times a turn; on a linear axis half a wave to three over the stroke."""
-        if has(mount, InertiaVariation):
-            return
         for cycles in TURNS if mount.motion == "rotary" else [waves / span.reach for waves in STROKES]:
 
             def start(c: Array, cycles: float = cycles) -> Effect:

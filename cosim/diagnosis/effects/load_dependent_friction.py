@@ -24,7 +24,7 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Only a known weight tells the load."""
-        if mount.friction.key == "none" or not has(mount, PayloadEffect) or has(mount, LoadDependentFriction):
+        if not has(mount, PayloadEffect):
             return
         forms = [LoadDependentFriction(coulomb_per_Nm=0.0)]
         if level := contact_level(mount):

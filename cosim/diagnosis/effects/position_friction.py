@@ -10,7 +10,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Hypothesis, Reach, Rippled, turn
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.row_weights import bend, least_way
@@ -27,8 +27,6 @@ class FrictionRipple(Rippled[PeriodicFriction]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Strongest cycles of what changes its sign with the speed."""
-        if mount.friction.key == "none":
-            return
         for cycles in peaks(span, span.residual * np.sign(span.v), lowest=0.3):
             yield self.wave(cycles)
 
@@ -65,8 +63,6 @@ class RoughSpot(Hypothesis[LocalFriction]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Two widths, places all over the range."""
-        if mount.friction.key == "none" or has(mount, LocalFriction):
-            return
         low, high = np.quantile(span.q, [0.01, 0.99])
         for share in (0.03, 0.08):
             width = share * (high - low)

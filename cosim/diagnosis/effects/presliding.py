@@ -34,8 +34,6 @@ class BendingContact(Hypothesis[Presliding]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Nine reaches."""
-        if mount.friction.key == "none" or mount.law.states():
-            return
         # Where the contact only bends, a fitted level is nothing: the torque tells how strong it is at least.
         level = max(contact_level(mount), float(np.median(np.abs(span.tau))))
         for reach in np.geomspace(1e-4, 1.0, 9) * span.reach:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
@@ -21,8 +21,6 @@ class Drag(Hypothesis[QuadraticDrag]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """One column."""
-        if has(mount, QuadraticDrag):
-            return
 
         def start(c: Array) -> Effect:
             return QuadraticDrag(coefficient=max(float(c[0]), 1e-9))

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
 from cosim.diagnosis.effects.tuning import at_bound, freed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
@@ -38,8 +38,6 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Five widths; a curve starts flat, at the level of the contact."""
-        if mount.friction.key == "none" or _has_curve(mount) or has(mount, StribeckEffect):
-            return
         base = contact_level(mount)
         for share in CURVES:
             Vs = share * span.top

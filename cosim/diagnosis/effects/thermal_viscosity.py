@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
@@ -29,8 +29,6 @@ class ThermalFriction(Hypothesis[ThermalViscosity]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Level and viscous friction, each with its own coefficient."""
-        if mount.friction.key == "none" or has(mount, ThermalViscosity):
-            return
         forms: list[ThermalViscosity] = [ThermalViscosity(viscous_per_degC=0.0)]
         if "temperature" not in span.extras:
             forms = [form for share in (0.25, 1.0) for form in _warming(share * span.seconds, span)]

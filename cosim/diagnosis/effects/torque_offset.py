@@ -21,7 +21,7 @@ class Offset(Hypothesis[TorqueOffset]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """One column of ones; beside friction that differs between the directions only where rest tells them apart."""
-        if has(mount, TorqueOffset) or has(mount, ConstantForce) or _is_alike(mount):
+        if _is_alike(mount):
             return
 
         def start(c: Array) -> Effect:

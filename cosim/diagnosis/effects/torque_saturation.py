@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis, Reach, Seen, of_that_size
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
@@ -27,8 +27,6 @@ class Saturation(Hypothesis[TorqueSaturation]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Knees below the highest torques that were asked for."""
-        if has(mount, TorqueSaturation):
-            return
         for share in (0.8, 0.9, 0.96, 0.985):
             knee = float(np.quantile(np.abs(span.tau), share))
             if knee > 0:

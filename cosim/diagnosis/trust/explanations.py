@@ -8,6 +8,7 @@ and Coulomb friction F then looks like one with J T / P and F T (time put right 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from math import exp, log, pi
+from typing import Any
 
 import numpy as np
 
@@ -45,30 +46,17 @@ class Explanation:
     """Whether the recording is wrong, and not the card."""
 
 
+def _of_card(what: str, prior: float, inertia: float = CARD_INERTIA, friction: float = CARD_FRICTION) -> Explanation:
+    """A card that is wrong, by such spreads."""
+    far: Kind = "base_far_from_card"
+    return Explanation(kind=far, what=what, prior=prior, inertia=inertia, friction=friction, is_slip=False)
+
+
 RIGHT = Explanation(kind=None, what="recording and card are right", prior=1.0, is_slip=False)
 CARDS = (
-    Explanation(
-        kind="base_far_from_card",
-        what="the machine's inertia is another than the card's (payload, counterweight, gear)",
-        prior=0.06,
-        inertia=ANY_INERTIA,
-        is_slip=False,
-    ),
-    Explanation(
-        kind="base_far_from_card",
-        what="the machine's friction is another than the card's",
-        prior=0.06,
-        friction=ANY_FRICTION,
-        is_slip=False,
-    ),
-    Explanation(
-        kind="base_far_from_card",
-        what="the card is of another machine",
-        prior=0.01,
-        inertia=ANY_INERTIA,
-        friction=ANY_FRICTION,
-        is_slip=False,
-    ),
+    _of_card("the machine's inertia is another than the card's (payload, counterweight, gear)", 0.06, ANY_INERTIA),
+    _of_card("the machine's friction is another than the card's", 0.06, friction=ANY_FRICTION),
+    _of_card("the card is of another machine", 0.01, ANY_INERTIA, ANY_FRICTION),
 )
 SIGN = Explanation(
     kind="torque_sign", what="the torque (or the position) has the wrong sign", prior=0.01, torque=-1.0, is_slip=True
@@ -103,19 +91,19 @@ def explanations(
     yield from _gears(linear)
     yield from (one for one in _torques(linear) if not (one.option and "tau" in stated))
     for unit, (factor, prior) in TIMES.items():
-        what = f"t counts {unit}"
-        yield Explanation(
-            kind="time_unit", what=what, prior=prior, time=factor, factor=factor, option=f"--units t={unit}"
-        )
+        yield _off("time_unit", f"t counts {unit}", prior, factor, "time", option=f"--units t={unit}")
     yield from _halves(reading) if speed_off == 1.0 else _contradiction(speed_off, linear, is_counted)
+
+
+def _off(kind: Kind, what: str, prior: float, factor: float, column: str, **more: Any) -> Explanation:
+    """A column of which all numbers are so many times too large."""
+    return Explanation(kind=kind, what=what, prior=prior, factor=factor, **{column: factor, **more})
 
 
 def _halves(reading: str) -> Iterator[Explanation]:
     """A radius for a diameter, a quadrature that is not counted."""
     for factor, how, prior in ((2.0, "twice too large", 0.01), (0.5, "half as large as it should be", 0.005)):
-        yield Explanation(
-            kind="position_scale", what=f'"{reading}" is {how}', prior=prior, position=factor, factor=factor
-        )
+        yield _off("position_scale", f'"{reading}" is {how}', prior, factor, "position")
 
 
 def _contradiction(k: float, linear: bool, is_counted: bool) -> Iterator[Explanation]:
@@ -141,23 +129,12 @@ def _contradiction(k: float, linear: bool, is_counted: bool) -> Iterator[Explana
 def _positions(linear: bool, reading: str) -> Iterator[Explanation]:
     tables = (ANGLES, LENGTHS) if reading == "q" else (SPEEDS, LINEAR_SPEEDS)
     for unit, (factor, prior) in tables[linear].items():
-        yield Explanation(
-            kind="position_scale",
-            what=f'"{reading}" is in {unit}',
-            prior=prior,
-            position=factor,
-            factor=factor,
-            option=f"--units {reading}={unit}",
-        )
+        option = f"--units {reading}={unit}"
+        yield _off("position_scale", f'"{reading}" is in {unit}', prior, factor, "position", option=option)
+    counts = f'"{reading}" counts {{factor}} to a {"metre" if linear else "radian"} (encoder counts)'
     for factor in np.exp(np.arange(log(200.0), log(1e7), GRID)).tolist():
-        yield Explanation(
-            kind="position_scale",
-            what=f'"{reading}" counts {{factor}} to a {"metre" if linear else "radian"} (encoder counts)',
-            prior=0.004 * GRID / log(5e4),
-            position=factor,
-            is_counted=True,
-            factor=factor,
-        )
+        prior = 0.004 * GRID / log(5e4)
+        yield _off("position_scale", counts, prior, factor, "position", is_counted=True)
 
 
 def _gears(linear: bool) -> Iterator[Explanation]:
@@ -183,19 +160,7 @@ def _gears(linear: bool) -> Iterator[Explanation]:
 def _torques(linear: bool) -> Iterator[Explanation]:
     unit_of = FORCES if linear else TORQUES
     for unit, (factor, prior) in unit_of.items():
-        yield Explanation(
-            kind="torque_scale",
-            what=f'"tau" is in {unit}',
-            prior=prior,
-            torque=factor,
-            factor=factor,
-            option=f"--units tau={unit}",
-        )
+        yield _off("torque_scale", f'"tau" is in {unit}', prior, factor, "torque", option=f"--units tau={unit}")
+    times = '"tau" is {factor} times the torque (a current, a per cent of the rated torque, a torque constant)'
     for factor in np.exp(np.arange(log(1e-3), log(1e4), GRID)).tolist():
-        yield Explanation(
-            kind="torque_scale",
-            what='"tau" is {factor} times the torque (a current, a per cent of the rated torque, a torque constant)',
-            prior=0.006 * GRID / log(1e7),
-            torque=factor,
-            factor=factor,
-        )
+        yield _off("torque_scale", times, 0.006 * GRID / log(1e7), factor, "torque")
