@@ -178,6 +178,3 @@ def _unit_of(over: str, scales: Scales) -> Scale:
 
 def _labelled(name: str, unit: Scale) -> str:
     return f"{name} [{unit.unit}]" if unit.unit else name
-
-
-__all__ = ["Nameless", "nameless"]

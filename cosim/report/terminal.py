@@ -229,6 +229,3 @@ def _wrote(diagnosis: Diagnosis) -> list[str]:
 def printable(text: str) -> str:
     """Return text without control characters: a name in a file must not steer the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
-
-
-__all__ = ["print_summary", "printable", "proposed", "styled", "summary"]

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from math import sqrt
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen
+from cosim.diagnosis.effects.base import Evidence, Form, Hypothesis, Seen
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, has
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
@@ -35,19 +35,34 @@ SMALL_MASS = 0.1
 """Share of the inertia that is then on the spring."""
 
 
-class Spring(Hypothesis[Compliance]):
-    """With the encoder on the motor."""
+class _AnySpring(Hypothesis[Form]):
+    """What both have in common."""
 
-    forms = (Compliance,)
     easiest: ClassVar[int] = -1
-    rank: ClassVar[float] = 19
     must_stand_out: ClassVar[bool] = True
     view = "spectrum"
 
+    def may_come(self, mount: Mount) -> bool:
+        """Where there is no other."""
+        return not (has(mount, Compliance) or has(mount, LoadSideCompliance))
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Lower resonances."""
+        return f"with a resonance below {seen.high:.3g} Hz; not testable above"
+
+    def is_degenerate(self, problem: Problem, effect: Any) -> bool:
+        """What is damped that much does not spring."""
+        return bool(effect.damping_ratio > MOST_DAMPING)
+
+
+class Spring(_AnySpring[Compliance]):
+    """With the encoder on the motor."""
+
+    forms = (Compliance,)
+    rank: ClassVar[float] = 19
+
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Antiresonances inside the band and a little above."""
-        if has(mount, Compliance) or has(mount, LoadSideCompliance):
-            return
         for hertz in np.geomspace(min(6.0, span.cutoff / 2), 1.2 * span.cutoff, 7):
             middling = _spring(float(hertz), SHARE)
 
@@ -56,33 +71,20 @@ class Spring(Hypothesis[Compliance]):
 
             yield Candidate("compliance", (middling,), (), start, positive=True)
 
-    def looked(self, seen: Seen, mount: Mount) -> str:
-        """Lower resonances."""
-        return f"with a resonance below {seen.high:.3g} Hz; not testable above"
-
     def tuned(self, problem: Problem, found: Fit, start: Compliance, evidence: Evidence) -> Fit:
         """Start from a smaller mass, and from a slower one, too."""
         others = [_spring(times * float(start.antiresonance_hz), SMALL_MASS) for times in SLOWER]
         return refound(problem, found, evidence, others)
 
-    def is_degenerate(self, problem: Problem, effect: Compliance) -> bool:
-        """What is damped that much does not spring."""
-        return bool(effect.damping_ratio > MOST_DAMPING)
 
-
-class LoadSideSpring(Hypothesis[LoadSideCompliance]):
+class LoadSideSpring(_AnySpring[LoadSideCompliance]):
     """With the encoder on the load: below the resonance the torque goes with the inverse of its square."""
 
     forms = (LoadSideCompliance,)
-    easiest: ClassVar[int] = -1
     rank: ClassVar[float] = 20
-    must_stand_out: ClassVar[bool] = True
-    view = "spectrum"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Resonances around the band and above."""
-        if has(mount, Compliance) or has(mount, LoadSideCompliance):
-            return
         for hertz in span.cutoff * RESONANCES:
             middling = LoadSideCompliance(resonance_hz=float(hertz), encoder_share=EVEN)
 
@@ -92,17 +94,13 @@ class LoadSideSpring(Hypothesis[LoadSideCompliance]):
 
             yield Candidate("compliance", (middling,), (), start, positive=True)
 
-    def looked(self, seen: Seen, mount: Mount) -> str:
-        """Lower resonances."""
-        return f"with a resonance below {seen.high:.3g} Hz; not testable above"
-
     def is_degenerate(self, problem: Problem, effect: LoadSideCompliance) -> bool:
         """What is damped that much does not spring; what shows in friction and hardly in acceleration is friction.
 
         In friction that turns round a law errs as a spring does: where .02 and .77 of what is added came from
         acceleration, springs were found that are not there; machines with one have 1.0.
         """
-        if effect.damping_ratio > MOST_DAMPING:
+        if super().is_degenerate(problem, effect):
             return True
         bare = replace(problem.mount, friction=Frictionless(), effects=())
         whole, inertial = (_added(problem, mount, effect) for mount in (problem.mount, bare))

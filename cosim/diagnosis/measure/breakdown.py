@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis.answer.result import Part, Trace
-from cosim.support.statistics import Array, Index, bootstrap_range, rms
+from cosim.support.statistics import Z95, Array, Index, bootstrap_range, rms
 
 Mask = npt.NDArray[np.bool_]
 MOST_BARS = 120
@@ -164,7 +164,7 @@ def curve(x: Array, y: Array, edges: Array) -> Curve:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(count >= 5, first / count, np.nan)
         spread = np.sqrt(np.maximum(second / count - mean**2, 0))
-        return Curve(centres, mean, 1.96 * spread / np.sqrt(np.maximum(count / 30, 1)))
+        return Curve(centres, mean, Z95 * spread / np.sqrt(np.maximum(count / 30, 1)))
 
 
 def grid(chosen: Samples, residual: Array, q_edges: Array, v_edges: Array) -> Array:

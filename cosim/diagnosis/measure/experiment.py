@@ -189,6 +189,3 @@ def _wire(source: str, target: str, more: str = "") -> list[str]:
 
 def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
-__all__ = ["SCENARIO", "Experiment", "Visited", "best", "in_words", "motions", "scenario"]

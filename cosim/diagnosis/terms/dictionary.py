@@ -53,11 +53,7 @@ def dictionary(prepared: Prepared) -> dict[str, Term]:
     pairs = {name: (make, _nothing) for name, make in makers.items()}
     if prepared.has_position:
         pairs |= _products(prepared)
-    return {name: Term(make, beyond, _scale(prepared, make)) for name, (make, beyond) in pairs.items()}
-
-
-def _scale(prepared: Prepared, make: Maker) -> Array:
-    return column_rms(made(prepared, make))
+    return {name: Term(make, beyond, column_rms(made(prepared, make))) for name, (make, beyond) in pairs.items()}
 
 
 def _of_position(prepared: Prepared) -> dict[str, Maker]:

@@ -18,7 +18,6 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.priors import trust
-from cosim.estimation.problem import Problem
 from cosim.support.statistics import rms
 from pyfmi_models.mount import Mount
 
@@ -133,7 +132,7 @@ class Grams:
 
 def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added: Sequence[CandidateTerm]) -> Grams:
     """Gram matrices of the training recordings, beside a structure."""
-    level = rms(comparison.nuisances.level) or float(np.std(_torque(comparison.problem)))
+    level = rms(comparison.nuisances.level) or float(np.std(comparison.problem.prepared.stacked("tau")))
     unit = [one.prior * (level if one.in_torque else 1.0) for one in added]
     widths = [found.slopes.shape[1], comparison.nuisances.columns.shape[1], *(int((one > 0).sum()) for one in unit)]
     edges = np.cumsum([0, *widths])
@@ -151,10 +150,6 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
         tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:])),
         np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0),
     )
-
-
-def _torque(problem: Problem) -> Array:
-    return problem.prepared.stacked("tau")
 
 
 def _by_recording(

@@ -14,6 +14,8 @@ from cosim.diagnosis.trust.explanations import Explanation, explanations
 from cosim.diagnosis.trust.likelihood import Evidence, Reference
 from cosim.support.errors import RecordingError
 
+SURE = 0.95
+"""Probability from which an explanation is stated alone."""
 ALONE = 0.2
 """Probability of being right below which one recording is doubted: there may be many, so half is too little."""
 MOST_ALONE = 6
@@ -150,7 +152,7 @@ def stated(judgement: Judgement) -> Sanity:
 def _causes(told: Sequence[tuple[Explanation, Alternative]]) -> str:
     best, first = told[0]
     hint = f" Use {best.option}." if best.option else ""
-    if first.likelihood > POLICY.nearly_all:
+    if first.likelihood > SURE:
         return f"{first.what[:1].upper()}{first.what[1:]}.{hint}"
     listed = "; or ".join(f"{one.what} ({one.likelihood:.0%})" for _, one in told)
     return f"Either {listed}.{hint}"
