@@ -51,11 +51,10 @@ from cosim.diagnosis.trust.changes import changes
 from cosim.diagnosis.trust.doubts import beyond_denial, doubts, of_base, of_delivered, single_readings, without_denied
 from cosim.diagnosis.trust.limits import end_stop, half_sample
 from cosim.estimation.blocks import Blocks
-from cosim.estimation.determined import limited, with_held
+from cosim.estimation.determined import limited, not_determined, with_held
 from cosim.estimation.end_stops import pushes, without
 from cosim.estimation.fit import Fit
 from cosim.estimation.half_sample import are_even, moved, torque_late
-from cosim.estimation.not_determined import not_determined
 from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import inside

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from cosim.estimation.not_determined import NotDetermined
+from cosim.estimation.determined import NotDetermined
 from cosim.support.plain import JsonObject
 
 Kind = Literal[

@@ -24,7 +24,7 @@ from cosim.diagnosis.answer.entries import (
 )
 from cosim.diagnosis.answer.ledger import Trial
 from cosim.diagnosis.answer.scores import Scores
-from cosim.estimation.not_determined import NotDetermined
+from cosim.estimation.determined import NotDetermined
 from pyfmi_models.effects import CATALOGUE, Effect
 
 Array = npt.NDArray[np.float64]

@@ -11,8 +11,7 @@ from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.protocol import Structures, band_of, judge, traces
-from cosim.estimation.determined import limited
-from cosim.estimation.not_determined import not_determined
+from cosim.estimation.determined import limited, not_determined
 from cosim.estimation.prepare import quality
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import CATALOGUE

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.estimation.determined import NotDetermined
 from cosim.estimation.identify.estimate import Estimate
 from cosim.estimation.identify.friction_map import FrictionMap
 from cosim.estimation.identify.identify import Identified
-from cosim.estimation.not_determined import NotDetermined
 from cosim.plots.quantities import number
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.plain import JsonObject
