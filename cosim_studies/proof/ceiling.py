@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim.diagnosis.evidence.band import in_band
-from cosim.diagnosis.measure.protocol import CUTOFF, heldout_rms
+from cosim.diagnosis.measure.protocol import heldout_rms
 from cosim.estimation.fit import fit
-from cosim.estimation.prepare import Array, Band, Prepared
+from cosim.estimation.prepare import PROTOCOL_HZ, Array, Band, Prepared
 from cosim.estimation.row_weights import described_rows
 from cosim.support.plain import Parsed
 from cosim_studies.proof.tool import given
@@ -56,7 +56,7 @@ def ceiling(
     folder: str,
     entries: Sequence[Mapping[str, Any]],
     truth: Mapping[str, Any] | None = None,
-    band: tuple[float, float] = (CUTOFF, CUTOFF),
+    band: tuple[float, float] = (PROTOCOL_HZ, PROTOCOL_HZ),
 ) -> Parsed:
     """{"heldout_rms": x, "base_rms": y}, or {"reason": why there is no x}, for the effects of a truth.
 

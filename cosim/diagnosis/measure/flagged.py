@@ -3,7 +3,7 @@
 Noise is what the better model leaves, or the base where there is none better. What is there only some of the time must
 not set the measure: the base is fitted once more by least absolute deviations, noise is a median, and both come from
 the training recordings. A span is loud where a chain of two states says so, noise of the usual size or `loud` times
-that,
+that, three at least,
 
     log p(loud) - log p(quiet) = z^2 (1 - 1 / loud^2) / 2 - log(loud),     z = residual / noise at this speed,
 
@@ -20,7 +20,7 @@ import numpy.typing as npt
 from cosim.diagnosis.evidence.bands import noise_over_speed
 from cosim.estimation.prepare import Array
 from cosim.estimation.row_weights import CLEAR_MOTION
-from cosim.support.statistics import rms, robust_rms
+from cosim.support.statistics import SURELY, rms, robust_rms
 
 Mask = npt.NDArray[np.bool_]
 Spans = tuple[tuple[float, float], ...]
@@ -31,10 +31,8 @@ INDEPENDENT = 0.3
 """Share of a cell that counts as an independent observation: the residual of neighbouring cells is alike."""
 CHANGE = 5.0
 """Log-odds that a change of state costs: quiet at three times the noise, some two seconds."""
-LEAST_LOUD = 3.0
-"""Loud is at least this many times the noise."""
 MOST = 3.0
-"""... and one cell says no more for it than this times log(loud): one spike is no span."""
+"""Times log(loud) that one cell says at most for being loud: one spike is no span."""
 MOST_NOISE = 3.0
 """Noise at one speed is no larger than this times that at the others: few moves are that fast, and what is missing may
 be in most of them."""
@@ -74,8 +72,8 @@ def flagged(residuals: Sequence[Residual]) -> list[Spans]:
         return np.minimum(noise_at(speed, residual, wanted), noise_at(speed, after, wanted))
 
     sizes = np.abs(residual) / noise(speed)
-    beyond = sizes[sizes > LEAST_LOUD]
-    loud = max(LEAST_LOUD, rms(beyond)) if len(beyond) else LEAST_LOUD
+    beyond = sizes[sizes > SURELY]
+    loud = max(SURELY, rms(beyond)) if len(beyond) else SURELY
     return [_spans(cell, noise(cell["speed"]), loud) for cell in cells]
 
 
