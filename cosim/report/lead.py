@@ -17,7 +17,7 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
         case "withheld":
             return "Check the recordings first: no effect can be named"
         case "unknown":
-            return f"{_open(diagnosis, model)}; {_REST}" if _named(diagnosis) else _unknown_heading(diagnosis)
+            return _beside_unknown(diagnosis, model) if _named(diagnosis) else _unknown_heading(diagnosis)
         case "none":
             return f"Nothing missing that {_these(diagnosis)} can show"
     return _open(diagnosis, model)
@@ -34,6 +34,12 @@ def _unknown_heading(diagnosis: Diagnosis) -> str:
     if diagnosis.broadband:
         return _SHAKEN
     return _NOT_CONFIRMED if any(one.answer == "not_proven" for one in diagnosis.findings) else _UNKNOWN
+
+
+def _beside_unknown(diagnosis: Diagnosis, model: str) -> str:
+    """Say first what the verdict has first: what has no name, where the names may be no more than imitations of it."""
+    said = _open(diagnosis, model)
+    return f"{_REST.capitalize()}; {lowered(said)}" if diagnosis.verdict[0] == "unknown" else f"{said}; {_REST}"
 
 
 def _named(diagnosis: Diagnosis) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.diagnosis.decide.calibration import LIKELY
 from cosim.plots.quantities import spelled
 from cosim.report.findings import do, untrained, where
 from cosim.report.lead import heading, in_motion
@@ -132,7 +133,8 @@ def _block(block: Block, scales: Scales) -> list[str]:
     """Return one row, or one a rival, joined by "or"."""
     if len(block.findings) == 1:
         return _row(WORDS.get(block.answer, block.answer), block.first, scales)
-    first = _row("either", block.first, scales)
+    is_likely = sum(one.probability for one in block.findings) >= LIKELY
+    first = _row("either" if is_likely else WORDS["ambiguous"], block.first, scales)
     return first + [line for rival in block.findings[1:] for line in _wrapped(_rival(rival), 12)]
 
 

@@ -139,7 +139,8 @@ def blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 def _rivals(finding: Finding, diagnosis: Diagnosis) -> tuple[Finding, ...]:
     group = next((group for group in diagnosis.ambiguous_with if finding.name in group), (finding.name,))
     others = (other for other in diagnosis.findings if other.name in group and other.name != finding.name)
-    return (finding, *(other for other in others if other.answer == "ambiguous"))
+    several = (finding, *(other for other in others if other.answer == "ambiguous"))
+    return tuple(sorted(several, key=lambda one: (one not in diagnosis.in_model, -one.probability)))
 
 
 def _block(findings: tuple[Finding, ...]) -> Block:

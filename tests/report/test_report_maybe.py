@@ -71,6 +71,25 @@ def test_a_heading_of_rivals_is_as_sure_as_they_are_together() -> None:
     assert lead.heading(three) == "One effect is missing from the model, with three possible causes"
 
 
+def test_what_has_no_name_is_said_first_where_the_names_may_only_imitate_it() -> None:
+    several = of(MAYBE, unknown=True)
+    first = replace(several, verdict=("unknown", MAYBE.effect))
+    rest, said = "art of the error fits no known effect", "ne effect may be missing from the model"
+    assert (lead.heading(several), lead.heading(first)) == (f"O{said}; p{rest}", f"P{rest}; o{said}")
+
+
+def test_of_several_causes_the_likeliest_is_read_first_unless_one_is_in_the_model() -> None:
+    weak, strong = (replace(one, probability=p) for one, p in zip(RIVALS, (0.01, 0.12), strict=True))
+    whole = replace(of(weak, strong), delivered=())
+    (block,) = (one for one in words.blocks(whole) if len(one.findings) > 1)
+    assert block.first is strong
+    lines = summary(whole).splitlines()
+    assert any(line.startswith("  possible  encoder eccentricity") for line in lines)
+    assert not any(line.startswith("  either") for line in lines), "together they are unlikely"
+    (block,) = (one for one in words.blocks(replace(whole, delivered=(weak.effect,))) if len(one.findings) > 1)
+    assert block.first is weak
+
+
 def test_page_and_terminal_use_one_word_for_what_may_be() -> None:
     whole = of(*FOUND, MAYBE)
     (block,) = (one for one in words.blocks(whole) if one.first is MAYBE)

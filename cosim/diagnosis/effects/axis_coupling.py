@@ -28,6 +28,7 @@ from pyfmi_models.effects.axis_coupling import (
     SpaceCoupling,
     WeightCoupling,
 )
+from pyfmi_models.effects.base import Motion
 from pyfmi_models.mount import Mount
 
 FOLLOWS = (1.0, 0.0, -1.0)
@@ -174,13 +175,6 @@ def _both_turn(one: Neighbour, mount: Mount) -> bool:
     return mount.motion == "rotary" and one.turns and bool(one.position)
 
 
-def _weight_left(problem: Problem, found: Fit, coupling: AxisCoupling, follows: float) -> Effect:
-    """A weight on both axes as large as what an inertia leaves says."""
-    name = coupling.neighbour
-    load, phase, _ = _wave_left(problem, found, follows, {name: 1.0})
-    return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
-
-
 def _spared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
     """A fit whose last effect hangs on two neighbours, or with what hangs on fewer or in fewer numbers.
 
@@ -199,29 +193,49 @@ def _spared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
 def _simpler(problem: Problem, found: Fit) -> Neighbouring | None:
     """The weight on one neighbour, or behind parallel axes, that explains most in the place of what hangs on two."""
     last: Any = found.mount.effects[-1]
-    rest, (first, second) = problem.without(found, last.name), last.neighbours
+    first, second = last.neighbours
     ways = [(own, {first: 1.0, second: other}) for own, other in TURNS if type(last) is SpaceCoupling]
-    taken = {one.source for one in rest.mount.effects}
+    taken = {one.source for one in found.mount.effects}
     ways += [(own, {name: 1.0}) for own in FOLLOWS for name in (first, second) if name not in taken]
-    waves = [(_wave_left(problem, rest, *way), *way) for way in ways]
-    if not waves:
+    if not ways:
         return None
+    left, known = _without_last(problem, found, last)
+    waves = [(_wave_of(problem, left, known, *way), *way) for way in ways]
     (load, phase, _), own, others = min(waves, key=lambda one: one[0][2])
     if len(others) > 1:
         return _chain(last.neighbour, (own, others[second]), load, phase)
     return WeightCoupling(weight=load, phase=phase, follows=own, neighbour=next(iter(others)))
 
 
-def _wave_left(problem: Problem, found: Fit, follows: float, others: Mapping[str, float]) -> tuple[float, float, float]:
-    """Weight, phase and error of what a fit leaves over an angle: so many turns of this axis and of each neighbour."""
+def _without_last(problem: Problem, found: Fit, last: Neighbouring) -> tuple[Array, Array]:
+    """What a fit leaves with the torque of its last effect, which hangs on two neighbours, and the other slopes."""
+    prepared = problem.prepared
+    q, v = prepared.stacked("q"), prepared.stacked("v")
+    places = (prepared.of_neighbour(key(name, "position")) for name in last.neighbours)
+    inputs = {one.name: place for one, place in zip(last.inputs(), places, strict=True)}
+    torque: Array = np.asarray(last.load(Motion(0.0, q, v, q, inputs)), float).ravel()
+    own = f"{list(found.mount.components())[-1]}."
+    return found.residual + torque, found.slopes[:, [not name.startswith(own) for name in found.free]]
+
+
+def _weight_left(problem: Problem, found: Fit, coupling: AxisCoupling, follows: float) -> Effect:
+    """A weight on both axes as large as what an inertia leaves says."""
+    name = coupling.neighbour
+    load, phase, _ = _wave_of(problem, found.residual, found.slopes, follows, {name: 1.0})
+    return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
+
+
+def _wave_of(
+    problem: Problem, left: Array, known: Array, follows: float, others: Mapping[str, float]
+) -> tuple[float, float, float]:
+    """Weight, phase and error of what is left over an angle: so many turns of this axis and of each neighbour."""
     prepared = problem.prepared
     theirs = [turns * prepared.of_neighbour(key(name, "position")) for name, turns in others.items()]
     angle = np.sum([follows * prepared.stacked("q"), *theirs], axis=0)
-    columns = np.column_stack([np.sin(angle), np.cos(angle), found.slopes]) * problem.weight[:, None]
+    columns = np.column_stack([np.sin(angle), np.cos(angle), known]) * problem.weight[:, None]
     size = column_rms(columns) + 1e-300
-    left = found.residual * problem.weight
-    c = np.linalg.lstsq(columns / size, left, rcond=1e-9)[0] / size
-    return max(hypot(c[0], c[1]), 1e-9), atan2(c[1], c[0]), float(np.linalg.norm(left - columns @ c))
+    c = np.linalg.lstsq(columns / size, left * problem.weight, rcond=1e-9)[0] / size
+    return max(hypot(c[0], c[1]), 1e-9), atan2(c[1], c[0]), float(np.linalg.norm(left * problem.weight - columns @ c))
 
 
 def _listed(several: Sequence[Neighbour], between: str = ", ") -> str:
