@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.effects import TRIED, named
+from cosim.diagnosis.effects import TRIED, candidates, named
 from cosim.diagnosis.effects.base import HELD, NO_FRICTION, NO_POSITION, UNSEEN
 from cosim.estimation.prepare import Prepared, prepare
-from pyfmi_models.effects import CATALOGUE, FrictionAsymmetry, GravityUnbalance
+from pyfmi_models.effects import CATALOGUE, ActuatorLag, Cogging, FrictionAsymmetry, GravityUnbalance
 from pyfmi_models.friction import Coulomb, Frictionless, LuGre
 from pyfmi_models.mount import Axis, Mount
 
@@ -56,3 +56,32 @@ def test_an_effect_that_the_law_or_the_card_holds_needs_no_recording() -> None:
     settled = [name for name in TRIED if named(name).is_settled(lugre)]
     assert sorted(settled) == ["constant_force", "presliding", "stribeck"], "a constant force is of a linear axis"
     assert [name for name in TRIED if named(name).is_settled(BARE)] == ["constant_force"]
+
+
+def asked(mount: Mount) -> set[str]:
+    """Effects for which a search has candidates, where every row is some residual."""
+    prepared = taken(BOTH_WAYS)
+    residual = np.cos(3 * prepared.stacked("t"))
+    return {one.effect for one in candidates(mount, prepared, residual, np.ones_like(residual))}
+
+
+def test_an_effect_that_a_mount_has_is_no_candidate_again_but_further_waves_are() -> None:
+    had = (
+        GravityUnbalance(mgl=1.0, phase=0.0),
+        FrictionAsymmetry(level_asymmetry=0.1),
+        Cogging(cycles_per_rev=3, amplitude=0.1, phase=0),
+    )
+    names = {effect.id for effect in had}
+    assert names <= asked(BARE)
+    assert names & asked(replace(BARE, effects=had)) == {"cogging"}
+
+
+def test_a_delay_is_a_candidate_beside_a_lag() -> None:
+    assert {"delay", "actuator_lag"} <= asked(BARE)
+    assert {"delay", "actuator_lag"} & asked(replace(BARE, effects=(ActuatorLag(time_constant_ms=5.0),))) == {"delay"}
+
+
+def test_no_effect_of_friction_is_a_candidate_where_there_is_none() -> None:
+    of_friction = {name for name in TRIED if any(form.place == "Friction" for form in CATALOGUE[name])}
+    assert of_friction & asked(BARE)
+    assert not of_friction & asked(replace(BARE, friction=Frictionless()))
