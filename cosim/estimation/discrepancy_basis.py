@@ -76,6 +76,18 @@ def speed_shapes(piece: Piece, top: float) -> Array:
 
 
 @kept_with()
+def friction_curve(prepared: Prepared) -> Array:
+    """Any friction over speed, alike both ways: eight cosines, finer ones smaller, at the kept rows, (rows, 8)."""
+    top = max(abs(edge) for edge in prepared.ranges["v"])
+
+    def waves(piece: Piece) -> Array:
+        share, sign = np.abs(piece.v) / top, np.tanh(piece.v / (1e-3 * top))
+        return np.column_stack([sign * np.cos(np.pi * k * share) / k for k in range(1, 9)])
+
+    return np.concatenate([piece.lowpass(waves(piece))[piece.kept] for piece in prepared.pieces])
+
+
+@kept_with()
 def discrepancy_basis(prepared: Prepared) -> tuple[Array, Array]:
     """Return the stop operators and the speed shapes at the kept rows, filtered: (rows, 8) and (rows, 3)."""
     distances = stop_distances(prepared)

@@ -101,14 +101,18 @@ def count(number: int) -> str:
 
 
 def law(diagnosis: Diagnosis) -> str:
-    """Return the sentence on the base's friction law, empty where no other one is proposed."""
-    told = diagnosis.friction_law
-    if not told.get("proposed") or told["proposed"] == told.get("base"):
-        return ""
-    share = f"{100 * float(told['gain']):.0f} %"
+    """Return the sentence on the base's friction law, empty where no other one is proposed and no curve would help."""
+    told, other = diagnosis.friction_law, ""
+    gain, curve = told.get("gain", 0.0), told.get("curve", 0.0)
+    if gain:
+        other = f"{told['proposed']} instead of {told['base']}"
+    if curve > gain:
+        other, gain = f"a curve over speed that is not that of {told['base']}", curve
     return (
-        f"Friction law: {told['proposed']} instead of {told['base']} would reduce the residual variance by up to "
-        f"{share}; not counted as a missing effect."
+        f"Friction law: {other} would reduce the residual variance by up to {100 * gain:.0f} %; "
+        "not counted as a missing effect."
+        if other
+        else ""
     )
 
 

@@ -251,6 +251,8 @@ def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_
     assert said in render(told)
     assert said in " ".join(summary(told).split())
     assert words.law(replace(told, friction_law={"base": "lugre", "proposed": "lugre", "gain": 0.0})) == ""
+    bent = words.law(replace(told, friction_law={"base": "lugre", "proposed": "lugre", "gain": 0.0, "curve": 0.87}))
+    assert "a curve over speed that is not that of lugre would reduce the residual variance by up to 87 %" in bent
 
 
 def test_something_unknown_stands_beside_what_is_named() -> None:

@@ -12,6 +12,8 @@ class LawProposal(TypedDict, total=False):
     base: str
     proposed: str
     gain: float
+    curve: float
+    """Share of that energy which a free curve over speed would remove."""
 
 
 class BiasEntry(TypedDict, total=False):

@@ -4,8 +4,9 @@ One bristle yields over one distance; a row of elements that slip one after the 
 would explain is measured with elements of free shares, the stop operators of the discrepancy basis. Everywhere else
 they are nuisances: there they keep a law's misfit from being taken for an effect, so here nothing else may stand beside
 them.
-Laws that differ in a number or two are fitted. A law without memory gets its memory from the effect `presliding`, and
-a Stribeck curve is an effect too.
+Laws that differ in a number or two are fitted. A law without memory gets its memory from the effect `presliding`. A
+friction that bends over speed in a way of its own has no law: what a free curve would explain is told beside the
+proposal.
 """
 
 from dataclasses import fields, replace
@@ -14,7 +15,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.entries import LawProposal
 from cosim.estimation.blocks import Blocks
-from cosim.estimation.discrepancy_basis import discrepancy_basis
+from cosim.estimation.discrepancy_basis import discrepancy_basis, friction_curve
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
@@ -23,8 +24,8 @@ from pyfmi_models.friction import LAWS, FrictionLaw
 FOLDS = 4
 """Every so many blocks are predicted from the others."""
 LEAST = 0.1
-"""Share of the residual energy that another law must remove; elements beside a true bristle removed up to 0.03 in 14
-simulated axes, and more than 0.2 in 7 of 11 that rub with slip blocks too."""
+"""Share of the residual energy that another law, or a curve, must remove; elements beside a true bristle removed up to
+0.03 in 14 simulated axes, and more than 0.2 in 7 of 11 that rub with slip blocks too."""
 
 
 def proposed_law(problem: Problem, chosen: Fit) -> LawProposal:
@@ -35,7 +36,9 @@ def proposed_law(problem: Problem, chosen: Fit) -> LawProposal:
         gains[form.key] = _elements_gain(problem, chosen) if form.in_rows else _fitted_gain(problem, chosen, form)
     best = max(gains, key=lambda key: gains[key])
     best = best if gains[best] > LEAST else base
-    return {"base": base, "proposed": best, "gain": gains[best] if best != base else 0.0}
+    curve = 0.0 if base == "none" else _gain_of(problem, chosen, friction_curve(problem.prepared))
+    gain, curve = (gains[best] if best != base else 0.0), (curve if curve > LEAST else 0.0)
+    return {"base": base, "proposed": best, "gain": gain, "curve": curve}
 
 
 def _fitted_gain(problem: Problem, chosen: Fit, form: type[FrictionLaw]) -> float:
@@ -51,11 +54,15 @@ def _instead(law: FrictionLaw, form: type[FrictionLaw]) -> FrictionLaw:
 
 
 def _elements_gain(problem: Problem, chosen: Fit) -> float:
-    """Share that a row of elements removes, beside the structure's own tangents, from blocks it was not fitted to."""
+    """Share that a row of elements of free shares removes."""
+    return _gain_of(problem, chosen, discrepancy_basis(problem.prepared)[0])
+
+
+def _gain_of(problem: Problem, chosen: Fit, shapes: Array) -> float:
+    """Share that shapes remove, beside the structure's own tangents, from blocks they were not fitted to."""
     weight = problem.weight[:, None]
-    own, stops = chosen.slopes * weight, discrepancy_basis(problem.prepared)[0] * weight
-    target, blocks = chosen.residual * problem.weight, Blocks.of(problem.prepared)
-    return 1 - _crossed(target, np.column_stack([own, stops]), blocks) / _crossed(target, own, blocks)
+    own, target, blocks = chosen.slopes * weight, chosen.residual * problem.weight, Blocks.of(problem.prepared)
+    return 1 - _crossed(target, np.column_stack([own, shapes * weight]), blocks) / _crossed(target, own, blocks)
 
 
 def _crossed(target: Array, columns: Array, blocks: Blocks) -> float:

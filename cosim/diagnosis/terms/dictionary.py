@@ -33,10 +33,9 @@ Maker = Callable[[Piece], list[Array]]
 
 @dataclass(frozen=True)
 class Term:
-    """Shapes of one quantity, and what they must go `beyond`; both made from any piece, scaled as in training."""
+    """Shapes of one quantity, made from any piece, scaled as in training."""
 
     make: Maker
-    beyond: Maker
     scale: Array
     """RMS of each shape in training."""
 
@@ -49,11 +48,8 @@ def dictionary(prepared: Prepared) -> dict[str, Term]:
     """What was recorded, by plain names."""
     makers = {**_of_speed(prepared), **_of_time(prepared), **_of_columns(prepared)}
     if prepared.has_position:
-        makers |= {**_of_position(prepared), **_of_reversals(prepared)}
-    pairs = {name: (make, _nothing) for name, make in makers.items()}
-    if prepared.has_position:
-        pairs |= _products(prepared)
-    return {name: Term(make, beyond, column_rms(made(prepared, make))) for name, (make, beyond) in pairs.items()}
+        makers |= {**_of_position(prepared), **_of_reversals(prepared), **_products(prepared)}
+    return {name: Term(make, column_rms(made(prepared, make))) for name, make in makers.items()}
 
 
 def _of_position(prepared: Prepared) -> dict[str, Maker]:
@@ -134,27 +130,16 @@ def _by_column(column: Column, sign: Column, p: Piece) -> list[Array]:
     return [column(p), column(p) * sign(p), column(p) * p.v]
 
 
-def _products(prepared: Prepared) -> dict[str, tuple[Maker, Maker]]:
-    """Products of position and user columns, beyond either of the two alone."""
-    sign, place, pairs = _sign(prepared), _place(prepared), dict[str, tuple[Maker, Maker]]()
-    for name, column in user_columns(prepared).items():
-        alone, product = partial(_alone, place, column, sign), partial(_product, place, column, sign)
-        pairs[f"position and {name}"] = product, alone
-    return pairs
-
-
-def _alone(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    waves = _waves(place(p), FEW)
-    return [other(p), other(p) * sign(p), *waves, *(wave * sign(p) for wave in waves)]
+def _products(prepared: Prepared) -> dict[str, Maker]:
+    """Products of position and user columns, without what goes with either of the two alone."""
+    sign, place = _sign(prepared), _place(prepared)
+    columns = user_columns(prepared).items()
+    return {f"position and {name}": partial(_product, place, column, sign) for name, column in columns}
 
 
 def _product(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
     waves = _waves(place(p), FEW)
     return [*(wave * other(p) for wave in waves), *(wave * other(p) * sign(p) for wave in waves)]
-
-
-def _nothing(_: Piece) -> list[Array]:
-    return []
 
 
 class FurtherColumns(NamedTuple):

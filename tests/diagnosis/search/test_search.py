@@ -12,6 +12,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence import comparison as evidence
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
+from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.rivals import refitted_from_here
 from cosim.diagnosis.search.stages import (
@@ -185,6 +186,24 @@ def test_in_a_contest_of_names_the_bases_merit_counts_as_little_as_rows_do() -> 
     )
     dear = replace(one, price_of_forms=20.0)
     assert contest(comparison, one, other) == pytest.approx(contest(comparison, dear, other) + 19.5)
+
+
+def bends(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A friction level that is 6 % off its law, in a wave over speed."""
+    return 0.06 * LEVEL * np.cos(9 * np.abs(v) + 0.5) * np.sign(v)
+
+
+def test_friction_that_bends_in_a_way_of_its_own_is_told_beside_the_law() -> None:
+    comparison, base = compared(bends)
+    law = proposed_law(comparison.problem, base)
+    assert (law["base"], law["proposed"]) == ("coulomb", "coulomb")
+    assert law["curve"] > POLICY.half
+
+
+def test_a_curve_says_nothing_where_the_law_is_the_machines() -> None:
+    rng = np.random.default_rng(3)
+    comparison, base = compared(lambda q, _: 0.02 * rng.standard_normal(len(q)))
+    assert proposed_law(comparison.problem, base)["curve"] == 0.0
 
 
 def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> None:
