@@ -95,10 +95,14 @@ Component = TypeVar("Component")
 
 
 class Recorded(NamedTuple):
-    """What recordings reach: highest speed [rad/s], and the torque command that is hardly ever exceeded [N m]."""
+    """What recordings reach: highest speed [rad/s], the torque command that is hardly ever exceeded [N m],
+    and the lowest and highest position [rad].
+    """
 
     speed: float
     torque: float
+    low: float = -inf
+    high: float = inf
 
 
 class Part:

@@ -235,7 +235,9 @@ def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
 def recorded_by(pieces: Sequence[Piece]) -> Recorded:
     """What some pieces reach."""
     top = max(float(np.abs(piece.v).max()) for piece in pieces)
-    return Recorded(top, float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98)))
+    often = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
+    visited = np.concatenate([piece.q for piece in pieces])
+    return Recorded(top, often, float(visited.min()), float(visited.max()))
 
 
 def _edges(mount: Mount, variables: Sequence[Variable], pieces: Sequence[Piece]) -> tuple[Array, Array]:

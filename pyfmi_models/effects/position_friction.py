@@ -7,7 +7,7 @@ import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times
 from pyfmi_models.effects.shares import higher, percent
-from pyfmi_models.model import Scalar, parameter
+from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +55,14 @@ class LocalFriction(_PositionFriction):
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """`level (1 + r exp(-((q - q_center)/width)^2 / 2))`."""
         return level * (1 + self.relative_amplitude * bump(motion.q, self.q_center, self.width))
+
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """A place that was visited, and no wider than all of them: beyond, it is another friction everywhere."""
+        if variable.name == "q_center":
+            return recorded.low, recorded.high
+        if variable.name == "width":
+            return variable.low, recorded.high - recorded.low
+        return variable.low, variable.high
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

@@ -62,12 +62,20 @@ def test_torque_alone_has_the_bits_of_torque_with_its_derivatives(prepared: Prep
     assert not np.array_equal(model.torque(inverse.present), expected)
 
 
-def test_a_place_that_recordings_say_nothing_of_does_not_go_on_to_infinity(prepared: Prepared) -> None:
+def test_a_rough_spot_stays_where_the_axis_was(prepared: Prepared) -> None:
     spot = LocalFriction(q_center=2.9, width=0.1, relative_amplitude=1.6)
     start = replace(MOUNT, friction=Coulomb(Fc=0.3, sigma2=1.5), effects=(spot,))
-    found = fit(start, prepared.pieces, np.ones(len(prepared.recording_of)), evaluations=60)
-    assert abs(found.parameters()["position_friction.q_center"]) <= 2.9 * fitting.FAR
-    assert np.isfinite(found.slopes).all()
+    found = fit(start, prepared.pieces, np.ones(len(prepared.recording_of)), evaluations=60).parameters()
+    q = prepared.stacked("q")
+    assert q.min() <= found["position_friction.q_center"] <= q.max()
+    assert 0 < found["position_friction.width"] <= np.ptp(q)
+
+
+def test_a_number_without_bounds_goes_no_further_than_its_unit_is_told_from_rounding() -> None:
+    nowhere = np.array([-np.inf]), np.array([np.inf])
+    own = fitting.coordinates(MOUNT, ("axis.inertia",), np.array([5.0]), nowhere)
+    assert own.high == -own.low
+    assert own.high + 1 > own.high == own.high + 0.4
 
 
 def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
