@@ -110,6 +110,8 @@ def register_of(values: Array, stated: str, t: Array | None = None) -> Register 
         stated: their unit, empty where none is.
         t: their times, where rows may be missing.
     """
+    if not np.isfinite(values).all():
+        return None  # said where rows are checked
     steps = np.diff(values)
     if not len(steps) or not 0 < np.ptp(values) < 2 * np.abs(steps).max():
         return None

@@ -1,6 +1,8 @@
 """Blocks of rows that count as one observation each, and standard errors that hold whatever the noise in them is."""
 
 from dataclasses import dataclass
+from math import sqrt
+from sys import float_info
 
 import numpy as np
 import numpy.typing as npt
@@ -59,5 +61,5 @@ def covariance(slopes: Array, left: Array, blocks: Blocks) -> Array:
     Parameters have units of their own, so directions are told apart in units of their derivatives' sizes.
     """
     size = np.sqrt((slopes**2).sum(0))
-    scale = np.where(size > 0, size, 1.0)
+    scale = np.where(size > sqrt(float_info.min), size, 1.0)  # a product of two that are smaller is none
     return np.asarray(sandwich(slopes / scale, left, blocks) / np.outer(scale, scale))

@@ -46,6 +46,13 @@ class Neighbouring(LoadEffect):
         """The column of each neighbour; none where the word is empty."""
         return tuple(self.neighbour.split(AND)) if self.neighbour else ()
 
+    def broken_rule(self) -> str:
+        """The word names as many neighbours as the form has."""
+        many = 1 + (SECOND in self.inputs())
+        if len(self.neighbours) in (0, many):
+            return ""
+        return f'neighbour "{self.neighbour}" must name {("one neighbour", "two neighbours, as q2 + q3")[many - 1]}'
+
     def recorded_as(self) -> Mapping[str, str]:
         """The neighbours' motion, each under its name."""
         known = dict(zip(("neighbour_", "second_neighbour_"), self.neighbours, strict=False))

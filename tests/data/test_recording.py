@@ -106,6 +106,7 @@ def spoiled(name: str, row: int, value: float) -> dict[str, np.ndarray]:
         (spoiled("t", 100, 0.099), 'stands still at row 101 (0.099 s to 0.099 s) and its rows differ: "q" is '),
         (spoiled("q", 6, np.nan), 'column "q" holds nan at row 7, which is not a finite number.'),
         (spoiled("tau", 6, np.inf), 'column "tau" holds inf at row 7, which is not a finite number.'),
+        (columns() | {"q": np.full(ROWS, np.inf)}, 'column "q" holds inf at row 1, which is not a finite number ('),
         (columns() | {"q": np.full(ROWS, 2.5)}, 'column "q" is 2.5 in every row; a constant signal tells nothing.'),
         (columns() | {"tau": np.zeros(ROWS)}, 'column "tau" is 0 in every row; a constant signal tells nothing.'),
         (columns(9), "has 9 rows; at least 100 are needed."),

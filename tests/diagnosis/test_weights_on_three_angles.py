@@ -1,5 +1,6 @@
 """A weight that hangs on three axes is found with both neighbours, as one sine of their sum or as products of sines."""
 
+import re
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from cosim.diagnosis.trust.admission import check_neighbours
 from cosim.estimation.neighbours import as_inputs
 from cosim.investigation.questions import effect_of
 from cosim.support.errors import RecordingError
-from pyfmi_models.card import parse_card
+from pyfmi_models.card import CardError, parse_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects.axis_coupling import PRODUCTS, ChainCoupling, SpaceCoupling
 from pyfmi_models.effects.base import Motion
@@ -99,3 +100,16 @@ def test_each_of_both_columns_must_be_there() -> None:
     assert np.ptp(fed["second_neighbour_position"] - run["q2"]) < 0.05 * np.ptp(run["q2"])
     with pytest.raises(RecordingError, match=r'reads "q9", which this recording lacks'):
         check_neighbours(missing, [run])
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ('weight=1.0\nfollows_second=1.0\nneighbour="q1"', 'neighbour "q1" must name two neighbours, as q2 + q3'),
+        ('weight=1.0\nfollows_second=1.0\nneighbour="a + b + c"', "must name two neighbours"),
+        ('inertia=1.0\nneighbour="q1 + q2"', 'neighbour "q1 + q2" must name one neighbour'),
+    ],
+)
+def test_a_coupling_names_as_many_neighbours_as_it_reads(keys: str, sentence: str) -> None:
+    with pytest.raises(CardError, match=re.escape(sentence)):
+        parse_card(CARD + f'[[effects]]\neffect="axis_coupling"\n{keys}\n', "c")
