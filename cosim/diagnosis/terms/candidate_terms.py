@@ -34,6 +34,8 @@ WAYS = (0.003, 0.01, 0.03, 0.1)
 """Ways over which a reversal is forgotten, in ranges of position."""
 TIMES = (0.1, 0.2, 0.4, 0.8, 1.6)
 """Times [s] in which a reversal is forgotten."""
+LEVEL = "friction level over position"
+"""Name of the term of a friction level that is not the same everywhere."""
 CREEP = 1e-3
 """Share of the top speed below which no direction is told."""
 
@@ -46,6 +48,8 @@ class CandidateTerm:
     effect: LearnedEffect
     prior: Array
     """Of each coefficient, relative; 0 for one that the base holds already."""
+    parts: tuple[str, ...] = ()
+    """Terms over one of its quantities alone, which it holds: it must say clearly more than they do."""
 
     @property
     def count(self) -> int:
@@ -120,7 +124,7 @@ def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     if rubs:
         level = _falling(WAVES, 0)
         yield _term("speed and position", LearnedViscous, level, over="position", seen=q, at_speed=top)
-        yield _term("friction level over position", LearnedFriction, level, over="position", seen=q)
+        yield _term(LEVEL, LearnedFriction, level, over="position", seen=q)
         after = {"ways": ways, "creep": CREEP * top}
         yield _term("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
 
@@ -171,4 +175,5 @@ def resolved(most: int, values: Array) -> int:
 def _of_products(name: str, by: Mapping[str, Any], prepared: Prepared) -> CandidateTerm:
     sizes = [a * b for a, b in product(_falling(FEW), _falling(by["waves"][1]))]
     shape = {"over": "position", "seen": prepared.ranges["q"], **by}
-    return _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
+    found = _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
+    return replace(found, parts=(LEVEL, f"friction level over {name}"))

@@ -5,14 +5,12 @@ import numpy as np
 from cosim.diagnosis.answer.scores import TermScores
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.terms.candidate_terms import LEVEL
 from cosim.diagnosis.terms.dictionary import OF_LAW, Term, dictionary
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array
 from cosim.support.statistics import rms
-
-LEVEL = "friction level over position"
-"""Name of the term of a friction level that is not the same everywhere."""
 
 
 def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list[TermScores]:

@@ -20,7 +20,7 @@ from cosim.diagnosis.terms.closed_form import ClosedForm, closed_form
 from cosim.diagnosis.terms.dictionary import OF_LAW
 from cosim.diagnosis.terms.grams import columns_of, grams_of
 from cosim.diagnosis.terms.partial import partial
-from cosim.diagnosis.terms.select import begun, fitted, paths
+from cosim.diagnosis.terms.select import begun, fitted, paths, telling
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
@@ -142,8 +142,8 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
     """
     tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if is_recorded(one, held)]
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
-    best: Learned | None = None
-    for chosen in begun(paths(grams_of(comparison, found, columns, tried), range(len(tried)))):
+    grams, best = grams_of(comparison, found, columns, tried), None
+    for chosen in begun(paths(grams, telling(grams, tried))):
         own = _judged(comparison, found, [tried[k] for k in chosen.order], held)
         if own and (best is None or (not own.helps, own.after) < (not best.helps, best.after)):
             best = replace(own, evidence=chosen.evidence, predicted=chosen.predicted)

@@ -54,6 +54,21 @@ def paths(grams: Grams, candidates: Sequence[int]) -> list[Path]:
     return [path for start in starts for path in (start, _path(grams, candidates, start))]
 
 
+def telling(grams: Grams, terms: Sequence[CandidateTerm]) -> list[int]:
+    """Terms that may be learned: a table over two quantities must say clearly more than terms over each of them alone.
+
+    Else a column that does nothing goes into the model with the position, over which friction is uneven anywhere.
+    """
+    every, places = list(range(grams.recordings)), {one.name: k for k, one in enumerate(terms)}
+
+    def tells(which: int, alone: Sequence[int]) -> bool:
+        whole, parts = (grams.marginal(chosen, every).log_likelihood for chosen in ([which], alone))
+        return whole - parts >= POLICY.clear
+
+    parts = [[places[name] for name in one.parts if name in places] for one in terms]
+    return [k for k, alone in enumerate(parts) if not alone or tells(k, alone)]
+
+
 def begun(found: Sequence[Path]) -> list[Path]:
     """Every path and all its beginnings, each set of terms once."""
     known: dict[frozenset[int], Path] = {}

@@ -16,8 +16,10 @@ from cosim.diagnosis.decide.decision import decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.terms.candidate_terms import candidate_terms
+from cosim.diagnosis.terms.grams import columns_of, grams_of
 from cosim.diagnosis.terms.learn import Learned, learn
-from cosim.diagnosis.terms.select import begun, paths
+from cosim.diagnosis.terms.select import begun, paths, telling
 from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from pyfmi_models.card import parse_card, read_card
 
@@ -100,6 +102,22 @@ def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
 @pytest.mark.parametrize("extra", [nothing, wanders])
 def test_nothing_is_delivered_where_it_does_not_help(extra: Extra) -> None:
     assert learned(extra) is None
+
+
+def uneven(now: dict[str, Array]) -> Array:
+    """A friction level that is not the same everywhere, at any temperature."""
+    return 0.3 * FC * np.sin(9 * now["q"]) * np.sign(now["v"])
+
+
+@pytest.mark.parametrize(("extra", "tells"), [(uneven, False), (warm_place, True)])
+def test_a_table_over_two_quantities_says_more_than_tables_over_each(extra: Extra, tells: bool) -> None:
+    comparison, base, _ = parts(extra)
+    prepared = comparison.problem.prepared
+    terms = candidate_terms(base.mount, prepared)
+    grams = grams_of(comparison, base, [columns_of(base.mount, one, prepared) for one in terms], terms)
+    names = [terms[k].name for k in telling(grams, terms)]
+    assert ("position and temperature" in names) is tells
+    assert {one.name for one in terms} - {"position and temperature"} <= set(names)
 
 
 def test_no_recording_is_worse_off_than_before() -> None:
