@@ -165,7 +165,7 @@ class ChainCoupling(Neighbouring):
     """A weight behind three axes that turn about parallel lines: torque = w sin(s q + q_n + s2 q_m + phase).
 
     Each link of a chain in a plane turns with the sum of the angles before it; an axis that counts the other way round
-    has -1, and s is 0 where this axis turns it no more. Reference: as `AxisCoupling`, section 2.9.1 and 7.3.2.
+    has -1, and s is 0 where this axis turns it no more. See sections 2.9.1 and 7.3.2 of what `AxisCoupling` refers to.
     """
 
     id: ClassVar[str] = AxisCoupling.id
@@ -198,7 +198,7 @@ class SpaceCoupling(Neighbouring):
     """A weight behind three axes that point anywhere: torque = sum over i, j, k of w_ijk f_i(q) f_j(q_n) f_k(q_m).
 
     f is sin or cos: each axis turns a weight's direction, so the torque is linear in sine and cosine of each angle. Of
-    axes that are parallel it is a `ChainCoupling`. Reference: as `AxisCoupling`, section 7.3: product of rotations.
+    axes that are parallel it is a `ChainCoupling`. It is a product of rotations: section 7.3 there.
     """
 
     id: ClassVar[str] = AxisCoupling.id
