@@ -105,9 +105,10 @@ def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str, rough: bool)
 
 
 def _ceiling(user: Cell, folder: str, truth: Parsed, said: Parsed) -> Parsed:
-    """The ceiling of a case, its errors in the band in which the answer tells its own."""
+    """The ceiling of a case, its errors in the band in which the answer tells its own, where it says that."""
     held = said["answer"]["heldout"]
-    return _call_tool(user, ceiling, folder, truth["effects"], truth["mount"], (held["cutoff_hz"], held["motion_hz"]))
+    band = [(held["cutoff_hz"], held["motion_hz"])] if "cutoff_hz" in held else []
+    return _call_tool(user, ceiling, folder, truth["effects"], truth["mount"], *band)
 
 
 def _call_tool(user: Cell, function: Callable[..., Any], *arguments: Any) -> Parsed:

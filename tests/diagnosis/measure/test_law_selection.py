@@ -38,6 +38,10 @@ def row_of_elements(q: Array) -> Array:
     return out
 
 
+KEPT = {"base": "lugre", "proposed": "lugre", "gain": 0.0, "curve": 0.0}
+"""No other law."""
+
+
 def problem(friction: FrictionLaw, truth: object) -> Problem:
     """Two recordings of an axis that turns over and over after distances of 2e-3 to 0.3 rad."""
     rng, t = np.random.default_rng(5), np.arange(30_000) / 1000
@@ -63,7 +67,7 @@ def test_a_row_of_elements_is_told_from_one_bristle(law: FrictionLaw) -> None:
     elements = proposed(law, row_of_elements)
     assert elements["proposed"] == "maxwell_slip"
     assert LEAST < float(elements["gain"]) < 1  # type: ignore[arg-type]
-    assert proposed(law, bristle) == {"base": law.key, "proposed": law.key, "gain": 0.0}
+    assert proposed(law, bristle) == {"base": law.key, "proposed": law.key, "gain": 0.0, "curve": 0.0}
 
 
 def test_one_bristle_is_proposed_in_place_of_a_row_of_elements_that_is_none() -> None:
@@ -81,7 +85,7 @@ def test_where_one_fold_holds_all_rows_that_count_nothing_is_predicted_and_no_la
     only = np.zeros(len(this.weight))
     only[np.concatenate(Blocks.of(this.prepared).rows[fold::FOLDS])] = 1.0
     weighed = replace(this, weight=only)
-    assert proposed_law(weighed, weighed.fit(this.mount, 10)) == {"base": "lugre", "proposed": "lugre", "gain": 0.0}
+    assert proposed_law(weighed, weighed.fit(this.mount, 10)) == KEPT
 
 
 def test_rows_that_do_not_count_in_one_fold_hide_no_row_of_elements_in_the_others() -> None:
@@ -100,4 +104,4 @@ def test_a_recording_of_one_block_predicts_nothing_of_itself(monkeypatch: pytest
     assert len(Blocks.of(prepared).rows) == 1
     mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1))
     this = Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3)
-    assert proposed_law(this, this.fit(mount, 10)) == {"base": "lugre", "proposed": "lugre", "gain": 0.0}
+    assert proposed_law(this, this.fit(mount, 10)) == KEPT
