@@ -25,7 +25,7 @@ def rms(values: npt.NDArray[np.floating]) -> float:
 
 
 def robust_rms(values: npt.NDArray[np.floating]) -> float:
-    """RMS of normal values, told by their median size: a few large ones do not move it."""
+    """RMS of normal values, from their median size: a few large ones do not move it."""
     return float(np.median(np.abs(values))) / NORMAL_MEDIAN
 
 

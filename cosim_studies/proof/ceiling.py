@@ -66,8 +66,8 @@ def ceiling(
         folder: where card and recordings are.
         entries: the effects.
         truth: the true numbers of the machine, one more place to start from.
-        band: cutoff of the torque and of the motion in which errors are told [Hz]: those of the answer beside which the
-            ceiling stands, as 30 Hz are mostly noise of the reading on some machines.
+        band: cutoff of the torque and of the motion in which errors are given [Hz]: those of the answer with which
+            the ceiling is compared, as 30 Hz are mostly noise of the reading on some machines.
     """
     if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
         return {"reason": f"{foreign[0]} has no structure in the library"}

@@ -57,11 +57,14 @@ class LocalFriction(_PositionFriction):
         return level * (1 + self.relative_amplitude * bump(motion.q, self.q_center, self.width))
 
     def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
-        """A place that was visited, and no wider than all of them: beyond, it is another friction everywhere."""
+        """A place that was visited, and no wider than all of them: beyond, it is another friction everywhere.
+
+        One that a card has elsewhere stays there: recordings say nothing of it.
+        """
         if variable.name == "q_center":
-            return recorded.low, recorded.high
+            return min(recorded.low, self.q_center), max(recorded.high, self.q_center)
         if variable.name == "width":
-            return variable.low, recorded.high - recorded.low
+            return variable.low, max(recorded.high - recorded.low, self.width)
         return variable.low, variable.high
 
     def statement(self, unit: str = "N·m") -> str:

@@ -63,12 +63,19 @@ def test_torque_alone_has_the_bits_of_torque_with_its_derivatives(prepared: Prep
 
 
 def test_a_rough_spot_stays_where_the_axis_was(prepared: Prepared) -> None:
-    spot = LocalFriction(q_center=2.9, width=0.1, relative_amplitude=1.6)
-    start = replace(MOUNT, friction=Coulomb(Fc=0.3, sigma2=1.5), effects=(spot,))
+    spot = LocalFriction(q_center=-0.53, width=0.17, relative_amplitude=1.65)
+    start = replace(MOUNT, friction=Coulomb(Fc=0.1, sigma2=1.5), effects=(spot,))
     found = fit(start, prepared.pieces, np.ones(len(prepared.recording_of)), evaluations=60).parameters()
     q = prepared.stacked("q")
     assert q.min() <= found["position_friction.q_center"] <= q.max()
     assert 0 < found["position_friction.width"] <= np.ptp(q)
+
+
+def test_a_rough_spot_of_a_card_stays_where_no_recording_went(prepared: Prepared) -> None:
+    spot = LocalFriction(q_center=9.0, width=0.2, relative_amplitude=0.5)
+    found = fit(replace(MOUNT, effects=(spot,)), prepared.pieces, np.ones(len(prepared.recording_of))).parameters()
+    assert found["position_friction.q_center"] == pytest.approx(9.0, abs=1e-6)
+    assert found["position_friction.width"] == pytest.approx(0.2, abs=1e-6)
 
 
 def test_a_number_without_bounds_goes_no_further_than_its_unit_is_told_from_rounding() -> None:

@@ -90,8 +90,9 @@ class NeighbouringAxis(Hypothesis[Neighbouring]):
         return [one for one in tried if type(one.instances[0]) is AxisCoupling]
 
     def where(self, effect: Neighbouring, reach: Reach) -> Where:
-        """Wherever the neighbour moves."""
-        return Where(axis="everywhere", description=f"wherever {effect.called} moves", regions=())
+        """Wherever the neighbour moves, or both move."""
+        moves = "move" if len(effect.neighbours) > 1 else "moves"
+        return Where(axis="everywhere", description=f"wherever {effect.called} {moves}", regions=())
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """It needs columns of a neighbour that moves by itself."""

@@ -5,7 +5,7 @@ would explain is measured with elements of free shares, the stop operators of th
 they are nuisances: there they keep a law's misfit from being taken for an effect, so here nothing else may stand beside
 them.
 Laws that differ in a number or two are fitted. A law without memory gets its memory from the effect `presliding`. A
-friction that bends over speed in a way of its own has no law: what a free curve would explain is told beside the
+friction that bends over speed in a way of its own has no law: what a free curve would explain is given with the
 proposal.
 """
 

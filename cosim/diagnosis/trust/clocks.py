@@ -44,6 +44,8 @@ WORSE = -0.25
 """The same of the recording in which it is least: one clock is that of all, and a lag that leaves this much more of one
 is no clock's. 92 machines whose position was shifted by 20 and 40 ms have -.07 and more, two eccentric encoders, whose
 ripple looks late at one speed, -1.2 and -1.5. Unit: 1."""
+CLOCKS, CLOCKS_TOO_LATE = 0.6, 0.85
+"""Share of either kind that comes from clocks and late read-outs; the others are dead times of drives. Unit: 1."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
         f"{names}: the position comes {span} {how}. That is more than {beyond}: check that one clock stamps both when "
         "they are sampled, or shift one of them."
     )
-    share = 0.85 if found.is_too_late else 0.6
+    share = CLOCKS_TOO_LATE if found.is_too_late else CLOCKS
     clock = Alternative(what="two clocks, or a late read-out of one signal", likelihood=share)
     causes = (clock, Alternative(what=other, likelihood=1 - share))
     return (Sanity(finding="clocks", statement=text, alternatives=causes, blocks_naming=found.is_too_late),)
