@@ -45,6 +45,7 @@ def estimated(train: Sequence[Recording], motion: str, on_progress: Callable[[st
 
     on_progress("estimating a card from the recordings")
     found = estimated_card(train, motion, is_asked=False)
-    names = ", ".join(f"{one.name.rpartition('.')[2]} {one.value:.4g} {one.unit}" for one in found.numbers)
-    said = " ".join([f"No card was given; it is estimated from the recordings: {names}.", *found.notes])
-    return found.card, said
+    known = [one for one in found.numbers if one.is_determined]
+    names = ", ".join(f"{one.name.rpartition('.')[2]} {one.value:.4g} {one.unit}" for one in known)
+    said = f"No card was given; it is estimated from the recordings{': ' if names else ''}{names}."
+    return found.card, " ".join([said, *found.notes])

@@ -27,6 +27,8 @@ def renamed(path: Path, values: dict[str, np.ndarray], columns: Mapping[str, str
     for name, source in columns.items():
         if source not in values:
             message = f'{path} has no column "{short(source)}" to serve as {name}; it has: {listed(tuple(values))}.'
+            if "," in source and "=" in source:
+                message += f" Several go with spaces: --columns {short(f'{name}={source}'.replace(',', ' '))}."
             raise RecordingError(message, culprit=str(path), value=source, choices=tuple(values))
     sources = {source: name for name, source in columns.items()}
     taken = {name: f"{name}_original" for name in columns if name in values and name not in sources}

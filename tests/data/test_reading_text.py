@@ -282,6 +282,7 @@ def test_options_may_hold_for_one_file(tmp_path: Path) -> None:
     [
         (["run4.csv:tau=current"], [], [], '"run4.csv", which is not among: run1.csv, run3.csv. Did you mean "run'),
         (["run3:tau=curent"], [], [], 'no column "curent" to serve as tau; it has: t, load, current, q. Did you mean'),
+        (["tau=current,q=q"], [], [], "Several go with spaces: --columns tau=current q=q."),
         (["run3:tau=current"], ["run3:tau=A"], [], "a current becomes one with the constant of the motor"),
         (["run3:tau=current"], ["run3:tau=V"], [], "it is a torque or force, in N.m or a unit that becomes it"),
         ([], [], ["decimals=comma"], '"decimals" is no key; keys there are: separator, decimal, header'),

@@ -12,7 +12,7 @@ from two_links import OWN, elbow
 from wandering import swing
 
 import cosim
-from cosim.api.defaults import split
+from cosim.api.defaults import estimated, split
 from cosim.data.recording import Recording
 from cosim.diagnosis.first_card import first_card
 from cosim.support.errors import InputError
@@ -145,6 +145,14 @@ def test_two_files_and_no_option_give_an_answer(
         r"No card was given; it is estimated from the recordings: inertia (1\.9\d*|2(\.0\d*)?) kg", said.err
     )
     assert Path("cosim_out/run1-1/card.toml").exists()
+
+
+def test_a_number_that_the_estimated_card_does_not_hold_is_not_told_as_one_of_it() -> None:
+    t = np.arange(0, 20, 0.005)
+    tau = 2.0 * -9.0 * np.sin(3 * t) + np.random.default_rng(3).normal(0, NOISE, len(t))
+    card, said = estimated([cosim.read(pd.DataFrame({"t": t, "q": np.sin(3 * t), "tau": tau}))], "rotary", print)
+    assert card.friction.Fc == 0.0  # type: ignore[attr-defined]
+    assert re.search(r"from the recordings: inertia [\d.]+ kg\.m2\. .*Coulomb friction; the card has none", said)
 
 
 def test_over_a_short_way_a_weight_and_a_constant_are_one_and_over_a_long_way_both_are_there() -> None:
