@@ -1,10 +1,8 @@
 """The command line: data on stdout, messages on stderr, one sentence for a mistake, nothing overwritten unasked."""
 
 import json
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -89,30 +87,6 @@ def test_an_fmu_that_prints_does_not_spoil_the_data(scenario: Path, tmp_path: Pa
     done = subprocess.run(command, env=ENVIRONMENT, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert json.loads(done.stdout)["steps"] == 500
     assert done.stderr.count("chatter") == 200
-
-
-@pytest.mark.parametrize(
-    ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
-)
-def test_ctrl_c_and_termination_leave_a_complete_file(
-    scenario: Path, tmp_path: Path, number: int, code: int, word: str
-) -> None:
-    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
-    with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        until = time.monotonic() + 60
-        while time.monotonic() < until and not any(
-            one.stat().st_size > 1000 for one in tmp_path.glob("out/.*.partial")
-        ):
-            time.sleep(0.05)  # until the first group of rows is in the file
-        process.send_signal(number)
-        _, said = process.communicate(timeout=60)
-    assert process.returncode == code
-    assert said.endswith(f"cosim: {word}\n")
-    assert "Traceback" not in said
-    recording = Recording.read(tmp_path / "out" / "recording.parquet")
-    assert recording.origin["complete"] is False
-    assert [one.name for one in (tmp_path / "out").iterdir()] == ["recording.parquet"]
 
 
 def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
@@ -238,16 +212,3 @@ def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(capsys: pytest.Captur
     for option in ("--version", "-V"):
         assert call(option) == 0
         assert capsys.readouterr().out == f"mount-cosim {cosim.__version__}\n"
-
-
-def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path: Path) -> None:
-    program = "import time; begun = time.process_time(); import cosim.cli; print(time.process_time() - begun)"
-    command = [sys.executable, "-c", program]
-    best = min(float(subprocess.check_output(command, env=ENVIRONMENT, cwd=tmp_path)) for _ in range(3))
-    assert best < 0.5
-    program = "import sys, cosim.cli\ntry: cosim.cli.main(sys.argv[1:])\nfinally: print(*sys.modules)"
-    command = [sys.executable, "-c", program, "run", "sidereal", "--stop", "0.1", "--out"]
-    environment = ENVIRONMENT | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    for name in ("cold", "warm"):
-        said = subprocess.check_output([*command, str(tmp_path / name)], env=environment, cwd=tmp_path, text=True)
-    assert not {"casadi", "ziglang", "matplotlib", "pandas"} & set(said.split())

@@ -34,7 +34,7 @@ def test_nothing_heavy_is_loaded(arguments: list[str], heavy: tuple[str, ...]) -
 
 
 def test_a_run_with_its_page_loads_nothing_that_reads_recordings_fits_or_draws(tmp_path: Path) -> None:
-    heavy = ("cosim.data.formats", "pyarrow.compute", "pandas", "scipy", "casadi", "matplotlib")
+    heavy = ("cosim.data.formats", "pyarrow.compute", "pandas", "scipy", "casadi", "ziglang", "matplotlib")
     code = CODE.format(arguments=["run", "sidereal", "--stop", "0.05", "--out", str(tmp_path)], heavy=heavy)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (tmp_path / "run.html").is_file(), done.stderr

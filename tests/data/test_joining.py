@@ -90,6 +90,19 @@ def test_a_slower_torque_gives_the_rows_and_the_position_is_read_on_a_curve() ->
     np.testing.assert_allclose(found.values["Angle"][1:-1], position(found.values["t"])[1:-1], atol=1e-10)
 
 
+@pytest.mark.parametrize(("closer", "missing", "lines"), [(2.8e-4, [], [98, 100]), (0.0, [100, 101], [98, 102])])
+def test_a_position_is_read_on_a_line_beside_a_short_step_or_a_hole(
+    closer: float, missing: list[int], lines: list[int]
+) -> None:
+    """A curve through two samples that nearly coincide, or through a hole, swings between them."""
+    kept = np.delete(np.arange(200), missing)
+    t, x = T[kept] + closer * ((kept == 99) - 1.0 * (kept == 100)), np.cos(kept * np.pi / 2)
+    slow = T[10:190:2] + 3e-4
+    found = joined(channels(Torque=(slow, torque(slow)), Angle=(t, x))).values
+    is_line = np.isclose(found["Angle"], np.interp(found["t"], t, x), atol=1e-9)
+    np.testing.assert_array_equal(found["t"][is_line], slow[np.array(lines) // 2 - 5])
+
+
 def test_of_equally_fast_channels_the_position_stays_as_it_was_read() -> None:
     late = T + 0.0003
     found = joined(channels(Torque=(T, torque(T)), Angle=(late, position(late))))

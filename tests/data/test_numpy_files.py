@@ -189,9 +189,15 @@ def test_a_structure_with_time_of_simulink_is_its_signals(tmp_path: Path) -> Non
     np.testing.assert_array_equal(seen["tau"], TAU)
 
 
-def test_a_signal_of_several_values_is_several_columns(tmp_path: Path) -> None:
-    scipy.io.savemat(tmp_path / "out.mat", {"x": {"time": T, "signals": {"values": JOINTS, "label": ""}}, "tau": TAU})
-    np.testing.assert_array_equal(Recording.read(tmp_path / "out.mat", {"t": "time", "q": "x_2"})["q"], 2 * Q)
+@pytest.mark.parametrize(
+    ("label", "column"), [("", "x_2"), (np.array(["one", "two", "three"], object), "two"), ("all", "all_2")]
+)
+def test_a_signal_of_several_values_is_several_columns(tmp_path: Path, label: object, column: str) -> None:
+    """Named by as many labels as there are values; by one label, or the structure, and a number else."""
+    scipy.io.savemat(
+        tmp_path / "out.mat", {"x": {"time": T, "signals": {"values": JOINTS, "label": label}}, "tau": TAU}
+    )
+    np.testing.assert_array_equal(Recording.read(tmp_path / "out.mat", {"t": "time", "q": column})["q"], 2 * Q)
 
 
 def test_a_recording_of_controldesk_has_the_names_and_units_of_its_signals(tmp_path: Path) -> None:

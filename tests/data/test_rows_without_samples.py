@@ -150,6 +150,13 @@ def test_names_are_found_where_the_columns_behind_them_are_empty(tmp_path: Path)
     assert {*seen.found.values} == {"Time", "Realtime Tick", "Present Position", "Goal Position"}
 
 
+@pytest.mark.parametrize(("held", "names"), [("", ["t", "tau", "q"]), ("1.5", ["t", "tau", "q", ""])])
+def test_a_column_without_a_name_is_one_if_it_holds_anything(tmp_path: Path, held: str, names: list[str]) -> None:
+    """A separator at the end of each row makes one that does not."""
+    path = written(tmp_path / "run.csv", "t,tau,q,", T, TAU, Q, [held if k == 7 else "" for k in range(400)])
+    assert [*preview(path).found.values] == names
+
+
 def test_fewer_names_than_columns_are_asked_for_where_numbers_have_points(tmp_path: Path) -> None:
     path = written(tmp_path / "run.csv", "t,tau", T, TAU, Q)
     with pytest.raises(UndecidedError, match='has names that do not fit its 3 columns, "t,tau"; say which is which'):

@@ -165,10 +165,6 @@ class TestCommand:
         assert "Traceback" not in error
         assert not (tmp_path / "out").exists()
 
-    def test_several_columns_may_follow_one_option(self, folder: Path, tmp_path: Path) -> None:
-        given = self.arguments(folder, tmp_path / "out", "--columns", "tau=torque", "q=angle")
-        assert self.run(given) == 2  # the file has no such columns, which is what the sentence is about
-
     def test_the_held_out_recording_must_not_be_fitted(
         self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -54,11 +54,6 @@ def test_another_policy_may_decide_otherwise() -> None:
     assert decide(stored, replace(POLICY, fair=1.0)).sets == {"cogging": ()}
 
 
-def test_a_learned_term_alone_says_unknown_unless_a_friction_law_would_do() -> None:
-    assert decide(CASES[2], POLICY).depends_on == ("temperature",)
-    assert not decide(replace(CASES[2], learned=replace(LEARNED, is_of_law=True)), POLICY).is_unknown
-
-
 def test_the_decision_imports_no_arrays() -> None:
     text = Path(decide.__code__.co_filename).read_text("utf-8")
     assert "numpy" not in text

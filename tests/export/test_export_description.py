@@ -1,5 +1,6 @@
 """The description says of variables what is true: dependencies, kinds, times, units to show."""
 
+import re
 from dataclasses import replace
 
 import casadi as ca
@@ -161,6 +162,7 @@ def test_a_fixed_parameter_is_settled_by_the_end_of_initialization(fmi, kind):
 
 def test_the_token_follows_the_content():
     model = models.lugre()
+    assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", generate(model).token)
     assert generate(model).token == generate(models.lugre()).token
     assert generate(model).token != generate(replace(model, name="other")).token
     harder = (replace(model.parameters[0], start=31.0), *model.parameters[1:])

@@ -5,8 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-import pytest
-from on_hardware import SIMULATED, recorded, scenario, session
+from on_hardware import SIMULATED, recorded, scenario
 
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session
@@ -28,11 +27,3 @@ def test_a_late_loop_is_told_and_the_simulated_machine_waits_for_it(tmp_path: Pa
     found = recorded(tmp_path)
     assert not found["machine.late"].any()
     assert replay(found).identical
-
-
-@pytest.mark.parametrize("edges", [64])
-def test_edges_that_a_machine_has_missed_stay_a_fault(tmp_path: Path, edges: int) -> None:
-    with session(tmp_path) as one:
-        one.enable()
-        one.lose(edges)
-        assert "deadline" in one.advance(edges + 2).faults

@@ -25,6 +25,12 @@ python = "odd.py:odd"
 inputs = { q = "rad" }
 outputs = { seen = "rad" }
 """
+ENDS = {
+    signal.SIGINT: (130, "cosim: interrupted\n"),
+    signal.SIGTERM: (143, "cosim: terminated\n"),
+    signal.SIGKILL: (-9, ""),
+}
+"""Exit code and last word of a run that a signal ends."""
 linux = pytest.mark.skipif(sys.platform != "linux", reason="signals and sessions as Linux has them")
 
 
@@ -180,13 +186,18 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
     written(scenario, "fail_at = 0.3, status = 12" if hang else "nan_at = 1e9")
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
     command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
-    process = subprocess.Popen(command, env=ENVIRONMENT | {"TMPDIR": str(temporary)}, stderr=subprocess.DEVNULL)
+    environment = ENVIRONMENT | {"TMPDIR": str(temporary)}
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 30
     while time.monotonic() < until and not list((tmp_path / "out").glob(".*.partial")):
         time.sleep(0.02)
     time.sleep(0.3)
     process.send_signal(number)
-    process.wait(20)
+    _, said = process.communicate(timeout=20)
+    code, word = ENDS[number]
+    assert process.returncode == code
+    assert said.endswith(word)
+    assert "Traceback" not in said
     until = time.monotonic() + 10
     while time.monotonic() < until and [pid for pid in processes() if str(temporary) in environment_of(pid)]:
         time.sleep(0.05)
@@ -194,6 +205,8 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
     assert left(temporary) == []
     files = [name for name in left(tmp_path / "out") if name != ".cosim.lock"]
     assert files == ["recording.parquet"] or (hang and files == [])  # a late computer interrupts before it hangs
+    if files and number != signal.SIGKILL:
+        assert Recording.read(tmp_path / "out" / files[0], required=()).origin["complete"] is False
 
 
 @linux

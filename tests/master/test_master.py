@@ -1,9 +1,6 @@
 """The master steps FMUs together: counted time, stated delays, the same bits in C and in Python, failures named."""
 
 import ctypes
-import os
-import subprocess
-import sys
 import tempfile
 import zipfile
 from contextlib import nullcontext
@@ -245,11 +242,3 @@ def packed(path: Path, tiny: Tiny, *, xml: str = "", library: bytes | None = Non
         archive.writestr("modelDescription.xml", xml or description(2))
         archive.writestr(f"binaries/{folder}/{Path(binary).name}", good.read(binary) if library is None else library)
     return path
-
-
-def test_a_run_imports_neither_casadi_nor_the_compiler_nor_pictures() -> None:
-    program = "import sys, cosim.master.simulate, cosim.system.scenario; print(*sys.modules)"
-    path = {"PYTHONPATH": str(Path(cosim.master.loop.__file__).parents[3])}
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | path)
-    assert not {"casadi", "ziglang", "matplotlib", "pyfmi_models", "pandas"} & set(done.stdout.split())

@@ -34,7 +34,9 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     table, notes = _parsed(path, body, layout)
     names, units, contradictions = names_of(layout)
     pairs = zip(names, table.columns, strict=True)
-    read = {name: _values(column, layout.decimal) for name, column in pairs if name or _holds(column)}
+    # A separator at the end of each row makes a column without a name that holds nothing.
+    held = [(name, column) for name, column in pairs if name or not pa.types.is_null(column.type)]
+    read = {name: _values(column, layout.decimal) for name, column in held}
     parted = {name: lists_of(path, column) for name, column in read.items()}
     kept = {
         (f"{name}.{k}" if parted[name] else name): one
@@ -62,11 +64,6 @@ def _values(column: Any, decimal: str) -> np.ndarray:
     if all(text is None or is_number(text, decimal) for text in texts) and any(texts):
         return np.array([np.nan if text is None else float(text.replace(decimal, ".")) for text in texts])
     return grouped(found, decimal)
-
-
-def _holds(column: Any) -> bool:
-    """Whether a column without a name holds anything: a separator at the end of each row makes one that does not."""
-    return not pa.types.is_null(column.type) and column.null_count < len(column)
 
 
 def _head(data: bytes, layout: Layout) -> tuple[bytes, ...]:

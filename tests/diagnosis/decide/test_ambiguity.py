@@ -24,7 +24,6 @@ from pyfmi_models.effects import (
     TorqueOffset,
 )
 from pyfmi_models.effects.cable_wrap import CableWrap
-from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -39,21 +38,6 @@ def problem(speed: Array, **columns: Array) -> Problem:
     given = {"t": t, "tau": speed, "q": np.cumsum(speed) / 1000, **columns}
     prepared = prepare([Recording("r", given)], 10.0)
     return Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), 1e-3)
-
-
-def test_a_clock_that_the_set_point_does_not_see_late_is_a_drive_whether_it_drifts_or_not() -> None:
-    t = np.arange(40_000) / 1000
-    q_d = np.sin(0.7 * t)
-    in_time, late = (
-        problem(0.7 * np.cos(0.7 * t), q_d=q_d),
-        problem(0.7 * np.cos(0.7 * t), q_d=np.sin(0.7 * t + 3.5e-3)),
-    )
-    for clock in (ClockSkew(offset_ms=-5.0), ClockSkew(offset_ms=-4.0, drift_ppm=-50.0)):
-        assert is_degenerate(in_time, clock)
-        assert not is_degenerate(late, clock)
-    assert is_degenerate(late, Delay(delay_ms=5.0))
-    assert not is_degenerate(in_time, Delay(delay_ms=5.0))
-    assert not is_degenerate(in_time, ClockSkew(offset_ms=-0.5, drift_ppm=100.0))
 
 
 @pytest.mark.parametrize(("ms", "degenerate"), [(0.51, True), (0.57, False), (5.0, False)])

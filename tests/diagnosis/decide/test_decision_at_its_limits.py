@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 from math import exp
+from typing import Any
 
 import pytest
 
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
+from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.decision import (
+    IN_BURSTS,
     Decision,
     Gain,
     beside_rest,
@@ -235,3 +237,44 @@ def test_names_that_make_the_model_worse_held_out_keep_half_of_their_probability
     assert worse.sets == better.sets == {"delay": ("lag",)}
     kept = {name: ROUND.half * p for name, p in better.probabilities["delay"].items()}
     assert worse.probabilities["delay"] == kept
+
+
+@pytest.mark.parametrize(
+    ("evidence", "removed", "more", "unknown"),
+    [
+        (20.0, 0.25, {}, True),
+        (20.0 - LITTLE, 0.25, {}, False),
+        (20.0, 0.25 - LITTLE, {}, False),
+        (1e3, 1.0, {"is_sure": False}, False),
+        (1e3, 1.0, {"is_of_law": True}, False),
+        (1e3, 1.0, {"quantities": ("position",)}, False),  # what any machine has
+    ],
+)
+def test_a_learned_term_alone_says_unknown_from_its_limits_on(
+    evidence: float, removed: float, more: dict[str, Any], unknown: bool
+) -> None:
+    """A share of the rest, and that share of the evidence of the strongest name."""
+    learned = replace(LearnedScores(("time",), evidence, removed, True, False), **more)
+    rest = left(TermScores("position", 1e3, 0.9, uneven=0.0))
+    found = decide(Scores([effect("delay", 80.0, 0.9)], rest, learned), ROUND)
+    assert found.is_unknown is unknown
+    assert found.depends_on == (("time",) if unknown else ())
+
+
+@pytest.mark.parametrize(
+    ("bursts", "shaken", "follows"),
+    [
+        (0.1875, 0.125, ()),
+        (0.1875 + LITTLE, 0.125, (IN_BURSTS,)),
+        (0.1875, 0.125 + LITTLE, ("nothing that was recorded",)),
+        (0.9, 0.9, (IN_BURSTS,)),
+    ],
+)
+def test_what_shakes_a_machine_is_unknown_beyond_its_limits_and_takes_nothing_from_a_name(
+    bursts: float, shaken: float, follows: tuple[str, ...]
+) -> None:
+    one = effect("cogging", 50.0, delay=9.0)
+    named = decide(Scores([one], left()), ROUND)
+    found = decide(Scores([one], replace(left(), in_bursts=bursts, shaken=shaken)), ROUND)
+    assert (found.is_unknown, found.depends_on) == (bool(follows), follows)
+    assert (found.sets, found.probabilities, found.doubtful) == (named.sets, named.probabilities, ())

@@ -114,11 +114,6 @@ def test_an_offset_is_told_beside_friction_and_load_of_another_day(factor: float
     assert predicted(recording, TorqueOffset(torque=-offset)) < 0
 
 
-def test_what_raises_the_held_out_error_does_not_predict() -> None:
-    v = np.sin(np.arange(SECONDS * RATE) / RATE)
-    assert predicted(held_out(white(3), v), TorqueOffset(torque=0.05)) < 0
-
-
 def test_a_diagnosis_never_ends_with_a_model_that_is_worse_than_the_base(tmp_path: Path) -> None:
     """A dwell that had a warm-up beside it was left alone when that was taken out, and misled."""
     write_case(make_case(1755486916, ("thermal_viscosity",)), tmp_path)

@@ -12,8 +12,8 @@ from motions import RATE, Array, Motion
 from cosim.data.recording import Recording
 from cosim.diagnosis import diagnose as whole
 from cosim.diagnosis.answer.result import Diagnosis
-from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
-from cosim.diagnosis.decide.decision import IN_BURSTS, decide, followed
+from cosim.diagnosis.answer.scores import ResidualScores, Scores
+from cosim.diagnosis.decide.decision import decide, followed
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.evidence.bursts import ABOVE, burst_share
@@ -222,17 +222,6 @@ def test_too_few_windows_tell_nothing() -> None:
     assert share(noise(np.where(T < 4, 10.0, 1.0)), weight=weight) == 0
     weight[: 21 * RATE] = 1
     assert share(noise(np.where(T < 4, 10.0, 1.0)), weight=weight) > 0.5
-
-
-def test_bursts_are_unknown_and_take_nothing_from_a_name() -> None:
-    one = EffectScores("cogging", 50.0, {"delay": 9.0}, {"cogging": 0.5, "delay": 0.1}, 20.0, 0.5)
-    quiet = ResidualScores(0.0, 0.0, in_bursts=POLICY.small)
-    loud = replace(quiet, in_bursts=1.001 * POLICY.small)
-    named, shaken = (decide(Scores([one], left), POLICY) for left in (quiet, loud))
-    assert not named.is_unknown
-    assert shaken.is_unknown
-    assert shaken.depends_on == (IN_BURSTS,)
-    assert (shaken.sets, shaken.probabilities, shaken.doubtful) == (named.sets, named.probabilities, ())
 
 
 def test_a_friction_level_that_is_another_for_some_seconds_is_no_burst() -> None:

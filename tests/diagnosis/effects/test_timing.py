@@ -121,7 +121,10 @@ def test_what_makes_a_torque_late_says_by_how_many_seconds(effect: Effect, secon
     [
         (ClockSkew(offset_ms=-5.2, drift_ppm=0.0), 5e-3, False),  # the reading trails by it: two clocks
         (ClockSkew(offset_ms=-5.0, drift_ppm=0.0), 0.0, True),  # it does not: a drive
-        (ClockSkew(offset_ms=5.0, drift_ppm=0.0), 0.0, False),  # no torque is late
+        (ClockSkew(offset_ms=-4.0, drift_ppm=-50.0), 5e-3, False),
+        (ClockSkew(offset_ms=-4.0, drift_ppm=-50.0), 0.0, True),
+        (ClockSkew(offset_ms=-0.5, drift_ppm=100.0), 0.0, False),  # no torque is late
+        (ClockSkew(offset_ms=5.0, drift_ppm=0.0), 0.0, False),
         (Delay(delay_ms=5.2), 5e-3, True),
         (Delay(delay_ms=5.0), 0.0, False),
         (ActuatorLag(time_constant_ms=0.1), 0.0, True),  # less than time stamps can be trusted for

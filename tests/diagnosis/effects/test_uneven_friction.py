@@ -50,7 +50,7 @@ def test_a_spot_is_rough_from_there_on(rise: float, named: bool) -> None:
     assert hypothesis_of(spot).is_plausible(spot, CARD.plant()) == named
 
 
-@pytest.mark.parametrize(("uneven", "unknown"), [(0.02, False), (0.05, True)])
+@pytest.mark.parametrize(("uneven", "unknown"), [(0.028, False), (0.029, True)])
 def test_nor_is_it_something_unknown(uneven: float, unknown: bool) -> None:
     term = TermScores("friction level over position", 200.0, 0.5, uneven=uneven)
     assert decide(Scores([], ResidualScores(0.0, 0.0, [term])), POLICY).is_unknown == unknown

@@ -21,7 +21,7 @@ from cosim.diagnosis.search.stages import admission, refitted, weighed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
-from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
+from cosim.estimation.residuals import away_from_turns, gets_memory
 from cosim.estimation.row_weights import weights
 from pyfmi_models.effects import Delay, TorqueOffset
 from pyfmi_models.effects.compliance import LoadSideCompliance
@@ -307,15 +307,6 @@ def test_held_out_too() -> None:
     pushed = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(TorqueOffset(torque=0.1),))
     assert held.at_rest(PLAIN, bent) > 0.9
     assert held.at_rest(PLAIN, pushed) == held.at_rest(bent, bent) == 0.0
-
-
-def test_where_an_axis_hardly_rests_nothing_is_asked() -> None:
-    weight, left, without = np.ones(50), np.ones(50), np.ones(50)
-    weight[:9] = 0
-    assert removed_at_rest(weight, 3 * left, without) == 1
-    weight[9] = 0
-    assert removed_at_rest(weight, 3 * left, without) == pytest.approx(-8)
-    assert removed_at_rest(weight, 0.5 * left, without) == pytest.approx(0.75)
 
 
 def test_memory_is_got_from_a_contact_and_from_nothing_else() -> None:

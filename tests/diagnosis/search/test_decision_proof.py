@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
+from named_structures import Fitted, Named, Structure, Tables, fitted
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search.alternatives import prove_sets
@@ -14,17 +14,6 @@ from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
 from cosim.diagnosis.search.stages import CandidateFit
 
 RULES = replace(POLICY, fair=3.0, clear=3.0, slight=0.1)
-
-
-@dataclass(frozen=True)
-class Named:
-    """An effect that is only its name."""
-
-    id: str
-
-    @property
-    def name(self) -> str:
-        return self.id
 
 
 @pytest.fixture(autouse=True)
@@ -36,65 +25,21 @@ def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @dataclass(frozen=True)
-class Structure:
-    """A mount that is only its effects."""
-
-    effects: tuple[Named, ...]
-
-    @property
-    def names(self) -> str:
-        return "".join(one.id for one in self.effects)
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A fit that leaves so much in each of four rows."""
-
-    mount: Structure
-    left: float = 0.0
-
-    @property
-    def residual(self) -> Any:
-        return np.full(4, self.left)
-
-
-@dataclass(frozen=True)
 class Candidate:
     evidence: float
     fit: Fitted
     plain_gain: float = 0.5
 
 
-class Tables:
-    """Comparison, problem and held-out recordings in one: the base has the effect "b" of its own."""
+class Held(Tables):
+    """Held-out recordings too."""
 
     policy = RULES
-    mount = Structure((Named("b"),))
     weight = np.ones(4)
 
     def __init__(self, nats: Mapping[str, float], errors: Mapping[str, float] | None = None) -> None:
+        super().__init__()
         self.nats, self.errors = nats, errors or {}
-        self.fitted: list[str] = []
-
-    def enter(self, *_: object) -> None:
-        """Nothing is written into a ledger here."""
-
-    judge = enter
-
-    @property
-    def problem(self) -> "Tables":
-        return self
-
-    def fit(self, mount: Structure, iterations: int) -> Fitted:
-        assert 1 < iterations < 100
-        self.fitted.append(mount.names)
-        return Fitted(mount)
-
-    def without(self, found: Fitted, name: str) -> Fitted:
-        """The base keeps its own effect."""
-        own = len(self.mount.effects)
-        kept = tuple(one for place, one in enumerate(found.mount.effects) if one.id != name or place < own)
-        return self.fit(Structure(kept), 30)
 
     def predicted(self, found: Fitted) -> float:
         return self.nats[found.mount.names]
@@ -113,19 +58,15 @@ class Tables:
         return self.plain_gains(*both)[0]
 
 
-def structure(names: str, left: float = 0.0) -> Fitted:
-    return Fitted(Structure(tuple(Named(one) for one in names)), left)
-
-
-def proven(tables: Tables, names: str, removed: float = 0.5, evidence: float = 100.0) -> Proof:
+def proven(tables: Held, names: str, removed: float = 0.5, evidence: float = 100.0) -> Proof:
     """Effects in the order of their evidence, each of which removes a share of what the base leaves."""
-    whole = structure("b" + names)
+    whole = fitted("b" + names)
     effects = []
     for place, name in enumerate(names):
-        own = Candidate(evidence - place, structure("b" + names, left=np.sqrt(1 - removed)), removed)
-        without = structure("b" + names.replace(name, ""), left=1.0)
+        own = Candidate(evidence - place, fitted("b" + names, left=np.sqrt(1 - removed)), removed)
+        without = fitted("b" + names.replace(name, ""), left=1.0)
         effects.append(AcceptedEffect((Named(name),), own, without, (), {}, {}))  # type: ignore[arg-type]
-    examined = Examined(structure("b", left=1.0), whole, tuple(reversed(effects)), None)  # type: ignore[arg-type]
+    examined = Examined(fitted("b", left=1.0), whole, tuple(reversed(effects)), None)  # type: ignore[arg-type]
     return prove(tables, examined, tables)  # type: ignore[arg-type]
 
 
@@ -134,7 +75,7 @@ def standing(proof: Proof) -> str:
 
 
 def test_effects_that_predict_stand_and_are_worth_what_is_lost_without_them() -> None:
-    tables = Tables({"b": 0.0, "bx": 10.0, "bxy": 17.0, "by": 5.0})
+    tables = Held({"b": 0.0, "bx": 10.0, "bxy": 17.0, "by": 5.0})
     proof = proven(tables, "xy")
     assert standing(proof) == "xy"
     assert proof.predicted == {"x": 12.0, "y": 7.0}
@@ -143,7 +84,7 @@ def test_effects_that_predict_stand_and_are_worth_what_is_lost_without_them() ->
 
 
 def test_where_nothing_predicts_the_base_stays() -> None:
-    proof = proven(Tables({"b": 0.0, "bx": -1.0, "bxy": -2.0, "by": -1.0}), "xy")
+    proof = proven(Held({"b": 0.0, "bx": -1.0, "bxy": -2.0, "by": -1.0}), "xy")
     assert standing(proof) == ""
     assert proof.chosen.mount.names == "b"  # type: ignore[attr-defined]
     assert proof.predicted == {"x": 0.0, "y": 0.0}
@@ -155,14 +96,14 @@ def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(
     more: float, left: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda problem, chosen, effect: effect.id != "y")
-    proof = proven(Tables({"b": 0.0, "bx": 10.0, "bxy": 10.0 + more, "by": more}), "xy")
+    proof = proven(Held({"b": 0.0, "bx": 10.0, "bxy": 10.0 + more, "by": more}), "xy")
     assert standing(proof) == left
     assert proof.chosen.mount.names == "b" + left  # type: ignore[attr-defined]
     assert [one.effect.id for one in proof.unproven] == [name for name in "xy" if name not in left]
 
 
 def test_the_list_ends_where_prediction_is_best_and_one_that_does_not_help_loses_no_later_one() -> None:
-    tables = Tables({"b": 0.0, "bx": -1.0, "bxy": 20.0, "by": 22.0, "bxyz": 19.0})
+    tables = Held({"b": 0.0, "bx": -1.0, "bxy": 20.0, "by": 22.0, "bxyz": 19.0})
     proof = proven(tables, "xyz")
     assert standing(proof) == "y", "x raises nothing and predicts nothing: it is taken out; z is beyond the best"
     assert proof.predicted == {"x": -2.0, "y": 22.0, "z": 0.0}
@@ -170,28 +111,28 @@ def test_the_list_ends_where_prediction_is_best_and_one_that_does_not_help_loses
 
 def test_one_effect_more_that_halves_the_error_is_tried_where_the_likelihood_cannot_tell() -> None:
     nats = {"b": 0.0, "bx": 10.0, "bxy": 9.0, "by": -4.0}
-    assert standing(proven(Tables(nats), "xy")) == "x"
-    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.8, "bxy": 0.3, "by": 0.8}), "xy")) == "xy"
+    assert standing(proven(Held(nats), "xy")) == "x"
+    assert standing(proven(Held(nats, {"b": 1.0, "bx": 0.8, "bxy": 0.3, "by": 0.8}), "xy")) == "xy"
 
 
 def test_of_two_ways_the_one_that_predicts_better_is_taken() -> None:
     """The first falls only because the second is there; alone it predicts more than both."""
-    tables = Tables({"b": 0.0, "bx": 60.0, "by": 50.0, "bxy": 52.0})
+    tables = Held({"b": 0.0, "bx": 60.0, "by": 50.0, "bxy": 52.0})
     proof = proven(tables, "xy")
     assert standing(proof) == "x"
-    tables = Tables({"b": 0.0, "bx": 52.5, "by": 54.0, "bxy": 55.0})
+    tables = Held({"b": 0.0, "bx": 52.5, "by": 54.0, "bxy": 55.0})
     assert standing(proven(tables, "xy")) == "y"
 
 
 def test_of_two_ways_one_that_halves_the_error_goes_before_one_that_leaves_it() -> None:
     """Fast rows by the hundred are predicted a little better by the first, which takes nothing of the error away."""
     nats = {"b": 0.0, "bx": 134.0, "by": 37.0, "bxy": 219.0}
-    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.99, "by": 0.4, "bxy": 0.45}), "xy")) == "y"
-    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.99, "by": 0.7, "bxy": 0.78}), "xy")) == "x"
+    assert standing(proven(Held(nats, {"b": 1.0, "bx": 0.99, "by": 0.4, "bxy": 0.45}), "xy")) == "y"
+    assert standing(proven(Held(nats, {"b": 1.0, "bx": 0.99, "by": 0.7, "bxy": 0.78}), "xy")) == "x"
 
 
 def test_what_stands_alone_is_not_fitted_again() -> None:
-    tables = Tables({"b": 0.0, "bx": 10.0})
+    tables = Held({"b": 0.0, "bx": 10.0})
     assert standing(proven(tables, "x")) == "x"
     assert tables.fitted == []
 
@@ -205,12 +146,12 @@ def test_what_is_small_in_training_and_alone_must_halve_the_held_out_error_and_p
 ) -> None:
     small, sure = 0.9 * RULES.small, RULES.sure
     likelihoods = {"b": 0.0, "bx": nats, "by": nats, "bxy": 2 * nats}
-    tables = Tables(likelihoods, {"b": 1.0, "bx": left, "by": left, "bxy": 0.3})
+    tables = Held(likelihoods, {"b": 1.0, "bx": left, "by": left, "bxy": 0.3})
     assert standing(proven(tables, names, small, sure - 1)) == expected
 
 
 def test_what_is_small_and_sure_need_not() -> None:
-    tables = Tables({"b": 0.0, "bx": 50.0}, {"b": 1.0, "bx": 0.8})
+    tables = Held({"b": 0.0, "bx": 50.0}, {"b": 1.0, "bx": 0.8})
     assert standing(proven(tables, "x", 0.9 * RULES.small, RULES.sure)) == "x"
     assert standing(proven(tables, "x", RULES.small, RULES.sure - 1)) == "x"
 
@@ -218,28 +159,22 @@ def test_what_is_small_and_sure_need_not() -> None:
 # What training leaves open, held-out recordings choose, where all but the choice is a table.
 
 
-class Recorded(Tables):
-    """The same with recordings of which nothing is asked."""
-
-    prepared = None
-
-
 def candidate(names: str, evidence: float) -> CandidateFit:
-    fit = structure("b" + names, left=np.sqrt(0.5))
+    fit = fitted("b" + names, left=np.sqrt(0.5))
     return CandidateFit(Named(names[-1]), fit, evidence, 0.0, 0.5)  # type: ignore[arg-type]
 
 
 def accepted(name: str, beside: str = "", **margins: float) -> AcceptedEffect:
     """An effect beside others, and by how many nats its rivals are behind it."""
     rivals = tuple(candidate(beside + one, 100.0 - by) for one, by in margins.items())
-    without = structure("b" + beside, left=1.0)
+    without = fitted("b" + beside, left=1.0)
     return AcceptedEffect((Named(name),), candidate(beside + name, 100.0), without, rivals, margins, margins)  # type: ignore[arg-type]
 
 
 def chosen(nats: Mapping[str, float], *effects: AcceptedEffect) -> tuple[Examined, Proof, str]:
-    whole = structure("b" + "".join(one.effect.id for one in effects))
-    examined = Examined(structure("b", left=1.0), whole, effects, None)  # type: ignore[arg-type]
-    tables = Recorded(nats)
+    whole = fitted("b" + "".join(one.effect.id for one in effects))
+    examined = Examined(fitted("b", left=1.0), whole, effects, None)  # type: ignore[arg-type]
+    tables = Held(nats)
     found, proof = prove_sets(tables, examined, tables)  # type: ignore[arg-type]
     return found, proof, "".join(one.effect.id for one in proof.standing)
 

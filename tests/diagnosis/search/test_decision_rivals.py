@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
+from named_structures import Fitted, Named, Structure, Tables, fitted
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search import rivals
@@ -15,34 +16,6 @@ from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
 from pyfmi_models.effects.position_friction import PeriodicFriction
 
 RULES = replace(POLICY, fair=3.0, clear=8.0)
-
-
-@dataclass(frozen=True)
-class Named:
-    id: str
-    amplitude: float = 0.0
-    source: str = ""
-
-    @property
-    def title(self) -> str:
-        return self.id
-
-    name = title
-
-
-@dataclass(frozen=True)
-class Structure:
-    effects: tuple[Named, ...]
-
-
-@dataclass(frozen=True)
-class Fitted:
-    mount: Structure
-    count: int = 0
-
-    @property
-    def names(self) -> str:
-        return "".join(one.id for one in self.mount.effects)
 
 
 @dataclass(frozen=True)
@@ -68,33 +41,8 @@ class Found:
     stages: tuple[Tried, ...] = ()
 
 
-class Tables:
-    """Comparison and problem in one; the card has the effect "b" of its own."""
-
+class Ruled(Tables):
     policy = RULES
-    mount = Structure((Named("b"),))
-    prepared = None
-
-    def enter(self, *_: object) -> None:
-        """Nothing is written into a ledger here."""
-
-    judge = enter
-
-    @property
-    def problem(self) -> "Tables":
-        return self
-
-    def fit(self, mount: Structure, iterations: int) -> Fitted:
-        return Fitted(mount)
-
-    def without(self, found: Fitted, name: str) -> Fitted:
-        """The base keeps its own effect."""
-        own = len(self.mount.effects)
-        return Fitted(Structure(tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.id != name)))
-
-
-def fitted(names: str, count: int = 0) -> Fitted:
-    return Fitted(Structure(tuple(Named(one) for one in names)), count)
 
 
 Play = Callable[..., Examined]
@@ -135,7 +83,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
         monkeypatch.setattr(rivals, "is_full", lambda *_: False)
         monkeypatch.setattr(rivals, "_is_wave", lambda effect: effect.id == "w")
-        return examine(Tables(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
+        return examine(Ruled(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
 
     return examined
 
@@ -262,7 +210,7 @@ def test_of_a_ripple_the_strongest_wave_is_shown() -> None:
 
 def test_effects_of_one_kind_are_one_group_and_those_of_the_card_in_none() -> None:
     one = Fitted(Structure((Named("b"), Named("x"), Named("y"), Named("x", 2.0))))
-    groups = grouped(Tables(), one)  # type: ignore[arg-type]
+    groups = grouped(Ruled(), one)  # type: ignore[arg-type]
     assert [[effect.id for effect in group] for group in groups] == [["x", "x"], ["y"]]
 
 

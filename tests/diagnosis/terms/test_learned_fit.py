@@ -7,18 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from learned_cases import FC, Array, Extra, droop, learned, parts, recording, swerve, teeth, wanders, warm_place
-from test_unknown import iron, kick
+from test_unknown import iron
 
 from cosim.delivery.deliver import as_json, deliver_quickly
 from cosim.delivery.proposal import Proposal
-from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
-from cosim.diagnosis.decide.decision import decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms
 from cosim.diagnosis.terms.grams import columns_of, grams_of
-from cosim.diagnosis.terms.learn import Learned, learn
+from cosim.diagnosis.terms.learn import learn
 from cosim.diagnosis.terms.select import begun, paths, telling
 from cosim.estimation.prepare import PROTOCOL_HZ, prepare
 from pyfmi_models.card import parse_card, read_card
@@ -37,11 +35,6 @@ def polish(now: dict[str, Array]) -> Array:
 
 def nothing(now: dict[str, Array]) -> Array:
     return 0 * now["t"]
-
-
-def says_unknown(found: Learned, *named: EffectScores) -> bool:
-    """Whether a learned term alone makes the answer "unknown", beside effects that are named."""
-    return decide(Scores(named, ResidualScores(0.0, 0.0), found.scores()), POLICY).is_unknown
 
 
 @pytest.mark.parametrize(
@@ -80,16 +73,6 @@ def test_sure_is_what_three_kinds_of_recordings_prove_each_for_itself() -> None:
     weak = POLICY.clear - 1
     for less in ({"evidence": (weak,)}, {"predicted": (weak,)}, {"gain": weak}, {"helps": False}):
         assert not replace(found, **less).is_sure
-
-
-def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_unknown() -> None:
-    found = learned(warm_place)
-    assert found is not None
-    assert says_unknown(found)
-    assert not says_unknown(replace(found, after=0.95 * found.before))
-    stronger = EffectScores("cogging", (min(found.evidence) + 1) / POLICY.considerable, {}, {"cogging": 1.0})
-    assert not says_unknown(found, stronger)
-    assert not says_unknown(replace(found, quantities=("speed",)))  # another friction law, no more
 
 
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
@@ -172,8 +155,3 @@ def test_a_diagnosis_says_unknown_delivers_the_term_and_its_card_holds_it(tmp_pa
     proposal = Proposal(formula, statement)
     assert proposal.id == "proposed_friction_over_position_and_temperature"
     assert said["formula"][0]["equation"] in proposal.text()
-
-
-def test_a_memory_of_reversals_is_learned_or_refused_but_never_worse() -> None:
-    found = learned(kick)
-    assert found is None or found.after < found.before

@@ -1,0 +1,87 @@
+"""Structures whose effects are only names: a search of which all but the choice is a table."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.decide.policy import POLICY
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that is only its name."""
+
+    id: str
+    amplitude: float = 0.0
+    source: str = ""
+
+    @property
+    def title(self) -> str:
+        return self.id
+
+    name = title
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A mount that is only its effects."""
+
+    effects: tuple[Named, ...]
+
+    @property
+    def names(self) -> str:
+        return "".join(one.id for one in self.effects)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit of so many numbers, that leaves so much in each of four rows."""
+
+    mount: Structure
+    count: int = 0
+    left: float = 0.0
+
+    @property
+    def names(self) -> str:
+        return self.mount.names
+
+    @property
+    def residual(self) -> Any:
+        return np.full(4, self.left)
+
+
+def fitted(names: str, count: int = 0, left: float = 0.0) -> Fitted:
+    """A fit of effects of one letter each."""
+    return Fitted(Structure(tuple(Named(one) for one in names)), count, left)
+
+
+class Tables:
+    """Comparison and problem in one; the base has the effect "b" of its own."""
+
+    policy = POLICY
+    mount = Structure((Named("b"),))
+    prepared = None
+
+    def __init__(self) -> None:
+        self.fitted: list[str] = []
+
+    def enter(self, *_: object) -> None:
+        """Nothing is written into a ledger here."""
+
+    judge = enter
+
+    @property
+    def problem(self) -> "Tables":
+        return self
+
+    def fit(self, mount: Structure, iterations: int) -> Fitted:
+        assert 1 < iterations < 100
+        self.fitted.append(mount.names)
+        return Fitted(mount)
+
+    def without(self, found: Fitted, name: str) -> Fitted:
+        """The base keeps its own effect."""
+        own = len(self.mount.effects)
+        kept = tuple(one for place, one in enumerate(found.mount.effects) if one.id != name or place < own)
+        return self.fit(Structure(kept), 30)
