@@ -92,6 +92,7 @@ class Answer:
     base: Fit
     held: Predictive
     found: Nameless
+    changed: tuple[Sanity, ...]
     scores: Scores
     detected: frozenset[str] = frozenset()
     delivered: Fit | None = None
@@ -248,7 +249,8 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, PROTOCOL_HZ))
     examined, proof = prove_sets(comparison, examined, held)
     found = nameless(comparison, examined, proof, held)
-    return Answer(comparison, examined.base, held, found, scores_of(comparison, found, held))
+    changed = changes((comparison.problem.prepared, prepared), found.proof.chosen.mount)
+    return Answer(comparison, examined.base, held, found, changed, scores_of(comparison, found, held, bool(changed)))
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> Diagnosis:
@@ -266,7 +268,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         verdict=_verdict(found, decision),
         findings=tuple(found),
         heldout=replace(seen.heldout, black_box_rms=black_box_rms(seen.traces)),
-        sanity=changes((problem.prepared, answer.held.prepared), answer.chosen.mount),
+        sanity=answer.changed,
         mount=card.mount.name,
         delivered=tuple(
             dict.fromkeys(effect.name for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])

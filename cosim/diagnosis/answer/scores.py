@@ -66,6 +66,8 @@ class ResidualScores:
     """Share of its energy that comes in bursts."""
     shaken: float = 0.0
     """Level of a random disturbance relative to friction, in training and held out, the less."""
+    changes: bool = False
+    """Whether the machine becomes another one in the middle of a recording."""
 
 
 @dataclass(frozen=True)

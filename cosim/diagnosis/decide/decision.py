@@ -72,7 +72,7 @@ def _decided(scores: Scores, policy: Policy) -> Decision:
         return found
     if set(learned.quantities) <= {term.name for term in scores.rest.terms} - {term.name for term in rest.terms}:
         return found
-    return beside_rest(scores.effects, learned.quantities, policy)
+    return beside_rest(scores.effects, learned.quantities, policy, rest.changes)
 
 
 def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
@@ -86,7 +86,7 @@ def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
 
 def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     if is_left(effects, residual, policy):
-        return beside_rest(effects, followed(residual, policy), policy)
+        return beside_rest(effects, followed(residual, policy), policy, residual.changes)
     named = _named(effects, policy)
     # What shakes a machine is no part of what a name says, and no name imitates it.
     shaking = [rule.name for rule in shaking_rules(residual, policy) if rule.outcome]
@@ -100,11 +100,17 @@ def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
         yield Rule(name, value > limit, value, limit)
 
 
-def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
-    """The answer where something without a name is left, that follows quantities: margins count for less there."""
+def beside_rest(
+    effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy, changes: bool = False
+) -> Decision:
+    """The answer where something without a name is left, that follows quantities: margins count for less there.
+
+    A name may imitate it where a term over what was recorded explains nearly as much, and where a machine `changes` at
+    a time: no term but the name has the load that came.
+    """
     weighed = [one.with_margins_of(policy.fair / policy.clear) for one in effects]
     weak = leave_much(effects, policy)
-    doubtful = tuple(one.effect for one in weak if one.ahead < policy.clear)
+    doubtful = tuple(one.effect for one in weak if changes or one.ahead < policy.clear)
     shares = {one.effect: policy.true_beside_unknown if one.effect in doubtful else policy.true_ahead for one in weak}
     return _named(weighed, policy).with_rest(follows, shares, doubtful)
 

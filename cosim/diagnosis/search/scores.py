@@ -1,5 +1,6 @@
 """What the decision is made from: numbers of what stands, and of what is left."""
 
+from dataclasses import replace
 from math import inf
 
 from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
@@ -34,9 +35,9 @@ def effect_scores(found: Nameless) -> list[EffectScores]:
     ]
 
 
-def scores_of(comparison: Comparison, found: Nameless, held: Predictive) -> Scores:
-    """Scores of what stands, and of what is left beside it."""
-    return Scores(effect_scores(found), residual_scores(comparison, found, held))
+def scores_of(comparison: Comparison, found: Nameless, held: Predictive, changes: bool) -> Scores:
+    """Scores of what stands, and of what is left beside it by a machine that `changes` within a recording or not."""
+    return Scores(effect_scores(found), replace(residual_scores(comparison, found, held), changes=changes))
 
 
 def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:

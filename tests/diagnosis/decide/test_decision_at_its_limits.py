@@ -205,6 +205,16 @@ def test_a_name_that_no_term_without_a_name_comes_near_is_less_of_an_imitation(
     assert beside.doubtful == (("cogging",) if kept == ROUND.true_beside_unknown else ())
 
 
+def test_beside_a_machine_that_changes_in_the_middle_a_name_that_leaves_much_may_stand_for_that() -> None:
+    weak, whole = (
+        replace(effect(name, 60.0), removes=of, ahead=50.0) for name, of in (("cogging", 0.5), ("delay", 0.9))
+    )
+    found = decide(Scores([weak, whole], replace(left(share=1.0), changes=True)), ROUND)
+    assert (found.is_unknown, found.doubtful) == (True, ("cogging",))
+    assert decide(Scores([weak, whole], left(share=1.0)), ROUND).doubtful == ()
+    assert not decide(Scores([weak, whole], replace(left(), changes=True)), ROUND).is_unknown
+
+
 def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() -> None:
     terms = [TermScores(name, 50.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
     assert followed(left(*terms), ROUND) == ("q", "a"), "beyond half of the best, the best first"
