@@ -120,17 +120,6 @@ def marked(mark: str) -> list[int]:
     return found
 
 
-def test_other_recordings_or_options_are_diagnosed_again(fleet: Path) -> None:
-    done = cosim.diagnose_folder("all", "found", quick=True)
-    assert [one.earlier for one in done.machines] == [False] * 2
-    assert sorted(done.missing) == sorted(LEVELS)
-    assert done.frame()["machine"].tolist() == [one.name for one in done.machines]
-    write(fleet / "all" / "north_1.csv", 2.5, 1)
-    again = cosim.diagnose_folder(fleet / "all", "found", quick=True)
-    assert {one.name: one.earlier for one in again.machines} == {"north": False, "south": True}
-    assert "2 machines" in repr(again)
-
-
 def test_the_key_of_an_answer_changes_with_files_card_and_options(fleet: Path) -> None:
     (machine, _) = machines_in(fleet / "all")
     order = Order(machine, "", fleet / "out", Options())
@@ -150,6 +139,9 @@ def test_a_cluster_gives_the_same_answers(fleet: Path, monkeypatch: pytest.Monke
     distributed = pytest.importorskip("distributed")
     (fleet / "all" / "south_2.csv").write_text("t,tau,q\n1,2,3\n", "utf-8")
     here = cosim.diagnose_folder("all", "here", quick=True)
+    assert [one.earlier for one in here.machines] == [False] * 2
+    assert here.frame()["machine"].tolist() == [one.name for one in here.machines]
+    assert "2 machines" in repr(here)
     settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
     with distributed.LocalCluster(**settings) as cluster:
         there = cosim.diagnose_folder("all", "there", quick=True, cluster=cluster.scheduler_address)

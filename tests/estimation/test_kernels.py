@@ -47,7 +47,7 @@ def operated(operation: int, x: ca.SX, y: ca.SX) -> ca.SX:
 
 
 def test_the_library_was_built() -> None:
-    assert library() is not None
+    assert hasattr(library(), "play_run")
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=[NAMES[one] for one in OPERATIONS])
@@ -162,10 +162,6 @@ def by_hand(plays: list[Backlash], v: np.ndarray, a: np.ndarray, monkeypatch: py
     with monkeypatch.context() as patch:
         patch.setattr(play, "library", lambda: None)
         return stepped_torque(plays, [5.0] * len(plays), v, a, DT)
-
-
-def test_the_library_has_plays() -> None:
-    assert hasattr(library(), "play_run")
 
 
 @pytest.mark.parametrize("many", [1, 8, len(SEVERAL)])

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import call
 from on_hardware import SIMULATED, machine, scenario, session
 from pydantic import ValidationError
 
 from cosim.data.recording import Recording
 from cosim.hardware import python_adapter, structures, udp, words
 from cosim.hardware.axis import cycles_of
+from cosim.hardware.loops import period_of
 from cosim.hardware.machine import Inject, changed
 from cosim.hardware.move import Move, _inertia, _set_points
 from cosim.hardware.session import Session
@@ -285,3 +287,20 @@ def test_what_is_over_of_the_set_points_counts_from_the_entry_into_operation() -
     assert Session._done(Silent(axis)) == 50  # type: ignore[arg-type]
     axis.running = 0
     assert Session._done(Silent(axis)) == 0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("step", [1e300, 11.0, 1e-9, float("nan"), float("inf")])
+def test_a_step_of_no_clock_is_refused(step: float) -> None:
+    with pytest.raises(HardwareError, match=r"has cycles of 1e-06 s to 10 s"):
+        period_of(step)
+
+
+def test_a_cycle_is_counted_in_nanoseconds() -> None:
+    assert [period_of(step) for step in (1e-6, 1e-4, 10.0)] == [1_000, 100_000, 10_000_000_000]
+
+
+@pytest.mark.parametrize(("option", "value"), [("--step", "1e300"), ("--counts-per-turn", "1e-320")])
+def test_a_virtual_drive_says_what_it_cannot_be(option: str, value: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("hardware", "virtual-drive", "paper_mount", "--port", "0", option, value) == 2
+    assert "Traceback" not in (said := capsys.readouterr().err)
+    assert said.startswith("cosim: ")

@@ -36,7 +36,7 @@ from pyfmi_models.card import parse_card
 __all__ = ["_path", "client", "desk"]
 
 SMALL = Limits(file=20_000, job=50_000, files=4, card=300, form=2_000)
-DAMAGES = 100
+DAMAGES = 40
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_job_takes_so_many_files_and_bytes_and_no_name_twice(tmp_path: Path) -
         assert put(client, job, "big.csv", b"x" * (50_000 - 3 * len(content) + 1)).status_code == 400
 
 
-def test_hundred_damaged_files_are_each_a_sentence_or_a_picture(client: TestClient, desk: Desk) -> None:
+def test_damaged_files_are_each_a_sentence_or_a_picture(client: TestClient, desk: Desk) -> None:
     """Real exports with bytes changed, cut, doubled or from elsewhere; the reader's process survives nearly all."""
     rng = np.random.default_rng(17)
     samples = [

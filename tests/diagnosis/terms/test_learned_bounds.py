@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from learned_cases import FC, MOUNT, Array, Extra, droop, learned, night, parts, wanders, warm_place
+from learned_cases import FC, MOUNT, Array, Extra, learned, night, parts, wanders, warm_place
 from test_unknown import iron
 
 from cosim.data.recording import Recording
@@ -25,9 +25,7 @@ from cosim.estimation.prepare import Prepared, prepare
 from cosim.support.statistics import rms
 from cosim_formulas.find import since
 from pyfmi_models.effects.compliance import Compliance
-from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
-from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedHysteresis
 
 
@@ -59,15 +57,6 @@ def test_the_effect_of_a_card_is_the_term_that_was_fitted() -> None:
         here = replace(base.mount, effects=(fitted.learned(fitted.coefficients.tolist()),))
         torques = [stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0] for one in (here, there)]
         np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
-
-
-def test_friction_that_is_learned_never_drives_and_a_drive_gives_more_for_more() -> None:
-    for extra in (warm_place, droop):
-        found = learned(extra)
-        assert found is not None
-        for effect in found.effects:
-            assert effect.broken_rule() == ""
-            assert isinstance(effect, LearnedFriction | LearnedViscous | LearnedDrive | LearnedGain)
 
 
 def test_a_hysteresis_that_would_give_energy_is_not_learned() -> None:

@@ -56,6 +56,8 @@ def test_what_has_no_name_is_modelled_and_the_held_out_error_falls(extra: Extra,
     low, high = found.interval
     assert 0 < low < found.before - found.after < high
     assert found.sentence().startswith(f"Something that depends on {quantity}")
+    for effect in found.effects:  # its friction never drives, its drive gives more for more
+        assert effect.broken_rule() == ""
 
 
 def test_what_fades_with_the_way_is_found_beside_the_temperature_that_rises_with_it() -> None:
