@@ -197,15 +197,6 @@ def test_a_file_of_a_machine_gives_its_motion(tmp_path: Path, name: str) -> None
         np.testing.assert_allclose(recording["q_d"], made.Q_D, atol=tolerance)
 
 
-@pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("name", READ)
-def test_what_is_not_known_is_asked_and_nothing_else(tmp_path: Path, name: str) -> None:
-    shown = preview(sample(name, tmp_path))
-    asked = bool(shown.undecided or shown.refused)
-    assert asked == (name in ANSWERS)
-    assert all("--" in sentence for sentence in (*shown.undecided, *[shown.refused] * bool(shown.refused)))
-
-
 def test_a_guide_log_has_no_torque_and_says_what_it_can(capsys: pytest.CaptureFixture[str]) -> None:
     path = SAMPLES / "PHD2_GuideLog.txt"
     with pytest.raises(RecordingError, match=r"holds where a guide star was, and no torque: .* cosim show"):
@@ -267,13 +258,23 @@ def _row(name: str, shown: Preview | None) -> str:
     return f"| `{name}` | {BY_WHOM[name]} | {became} | {f'`{said}` ' if said else ''}|"
 
 
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Preview]:
+    """What is seen of each file before anything is answered."""
+    folder = tmp_path_factory.mktemp("samples")
+    return {name: preview(sample(name, folder)) for name in READ}
+
+
 @pytest.mark.filterwarnings("default")
-def test_the_table_of_the_guide_is_what_happens(tmp_path: Path) -> None:
+def test_the_table_of_the_guide_is_what_happens_and_nothing_else_is_asked(shown: dict[str, Preview]) -> None:
     for package in ("mcap_ros2", "h5py", "asammdf"):
         pytest.importorskip(package)
-    shown = {name: None if name == "PHD2_GuideLog.txt" else preview(sample(name, tmp_path)) for name in BY_WHOM}
-    table = "\n".join(_row(name, one) for name, one in shown.items())
+    table = "\n".join(_row(name, shown.get(name)) for name in BY_WHOM)
     assert table in GUIDE, f"docs/reading.md should hold:\n{table}"
+    for name, one in shown.items():
+        asked = [*one.undecided, *[one.refused] * bool(one.refused)]
+        assert bool(asked) == (name in ANSWERS)
+        assert all("--" in sentence for sentence in asked)
 
 
 @pytest.mark.parametrize("line", re.findall(r"^cosim show samples/.*$", GUIDE, re.MULTILINE))
@@ -284,16 +285,14 @@ def test_a_recipe_of_the_guide_runs(line: str, capsys: pytest.CaptureFixture[str
     assert "options: " in out or "as an axis: " in out
 
 
-def test_the_options_that_are_shown_can_be_typed(tmp_path: Path) -> None:
-    for name in READ:
-        if name in BINARY:
+@pytest.mark.filterwarnings("default")
+def test_the_options_that_are_shown_can_be_typed(shown: dict[str, Preview]) -> None:
+    for name, one in shown.items():
+        if name in BINARY or one.refused:
             continue
-        shown = preview(SAMPLES / name)
-        said = options(shown.said)
-        if not shown.refused:
-            parsed = options_of(SAMPLES / name, said["columns"], said["units"], said["layout"])
-            again = preview(SAMPLES / name, parsed)
-            assert again.undecided == ()
+        said = options(one.said)
+        parsed = options_of(SAMPLES / name, said["columns"], said["units"], said["layout"])
+        assert preview(SAMPLES / name, parsed).undecided == ()
 
 
 # A table of several signals in one array is its columns, and many gains are no recording.

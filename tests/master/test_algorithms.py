@@ -121,24 +121,6 @@ def test_pieces_follow_the_energy_lost(plain: Tiny) -> None:
     assert 400 <= counts[0] < counts[1] / 1.5 < counts[2] / 3
 
 
-@pytest.mark.parametrize(
-    "algorithm",
-    [
-        GaussSeidel(kind="gauss-seidel"),
-        Iterated(kind="iterated", theta=0.7, tolerance=1e-12),
-        Energy(kind="energy", bonds=BOND, tolerance=1e-6),
-    ],
-)
-def test_the_loops_in_c_and_python_give_the_same_bits(plain: Tiny, algorithm: Any) -> None:
-    cases = [(version, compiled) for version in (2, 3) for compiled in (True, False)]
-    runs = [oscillator(plain[version], algorithm, compiled=compiled, decimation=2) for version, compiled in cases]
-    assert [run.statistics["loop"] for run in runs] == ["compiled", "interpreted"] * 2
-    for run in runs[1:]:
-        assert run.statistics["coupling"] == runs[0].statistics["coupling"]
-        for name in run.recording:
-            np.testing.assert_array_equal(run.recording[name], runs[0].recording[name])
-
-
 @pytest.fixture(scope="module")
 def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The two-mass mount: near side, far side and whole."""

@@ -45,14 +45,6 @@ def test_a_constant_rest_counts_whole_and_one_that_changes_within_a_quarter_of_a
     assert share_left(comparison, left(0.5 + fast)) == pytest.approx(0.25, rel=1e-12)
 
 
-def test_cells_of_a_quarter_of_a_second_do_not_reach_into_the_next_recording() -> None:
-    """A rest that changes its sign each quarter stays whole; the second recording begins a cell of its own."""
-    comparison = comparing(steady(1, 1), 1.0)
-    signs = np.repeat([1.0, -1.0, 1.0, -1.0], RATE // 4)
-    assert share_left(comparison, left(np.concatenate([signs, -signs]))) == pytest.approx(1.0, rel=1e-12)
-    assert share_left(comparison, left(np.roll(np.concatenate([signs, signs]), RATE // 8))) < 0.6
-
-
 def test_only_rows_in_clear_motion_count_by_their_weight() -> None:
     motion = Motion({"v": [np.repeat([1.0, 0.0], 2 * RATE)], "tau": [np.full(4 * RATE, 2.0)]})
     rest = np.repeat([0.5, 9.0], 2 * RATE)

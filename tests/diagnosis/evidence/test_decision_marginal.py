@@ -61,16 +61,6 @@ def test_where_every_row_counts_it_is_the_density_of_the_data_with_the_prior_of_
     assert (one.noise.tolist(), one.sizes.tolist()) == (NOISE.tolist(), SIZE.tolist())
 
 
-def test_rows_that_say_nothing_new_count_less_in_the_likelihood_and_in_the_fit() -> None:
-    drawn = bands()
-    half = found(drawn, np.array(ROWS) / 2.0, start=start(), rounds=0)
-    scaled = [(y / np.sqrt(2), x / np.sqrt(2)) for y, x in drawn]
-    same = found(scaled, start=start(), rounds=0)
-    spared = sum(many / 2 * np.log(variance) for many, variance in zip(ROWS, NOISE, strict=True)) / 2
-    assert half.beta == pytest.approx(same.beta, rel=1e-12)
-    assert half.log_likelihood == pytest.approx(same.log_likelihood + spared, rel=1e-12)
-
-
 def test_noise_and_sizes_that_are_renewed_explain_the_data_better_and_come_near_the_truth() -> None:
     true = np.array([0.25, 4.0])
     drawn = bands(noise=true, rows=(4000, 4000))
