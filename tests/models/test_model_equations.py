@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from effect_examples import evaluate, mount
 
-from pyfmi_models.correction import correction
-from pyfmi_models.effects import ActuatorLag, Motion
 from pyfmi_models.effects.alt_az import AltitudeInertia
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
@@ -19,9 +17,8 @@ from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.inertia_variation import InertiaVariation
-from pyfmi_models.friction import Coulomb, LuGre
+from pyfmi_models.friction import Coulomb
 from pyfmi_models.model import Model
-from pyfmi_models.mount import Axis, Mount
 from pyfmi_models.pointing import PointingError
 from pyfmi_models.setpoint import Sine
 
@@ -138,31 +135,3 @@ def test_a_pointing_error_is_the_angle_between_two_directions(azimuth: float, al
     np.testing.assert_allclose(turned, 0.0, atol=1e-9)
     opposite = at(model, 0.0, [azimuth + math.pi, -altitude, azimuth, altitude])
     assert opposite[2] == pytest.approx(math.pi, abs=1e-7)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_correction_is_the_torque_by_which_one_plant_accelerates_as_the_other(seed: int) -> None:
-    dice = Random(seed)
-    old = Mount(name="m", axis=Axis(inertia=2.0), friction=Coulomb(Fc=1.0, sigma2=3.0, smoothing=1e-3))
-    law = LuGre(sigma0=1e3, sigma1=4.0, sigma2=2.0, Fc=1.5, Fs=2.0, Vs=0.1)
-    new = Mount(
-        name="m",
-        axis=Axis(inertia=2.6),
-        friction=law,
-        effects=(ActuatorLag(time_constant_ms=4.0), CableWrap(stiffness=3.0, home=0.2)),
-    )
-    model = correction(old, new)
-    tau, q, v, z, lag = (dice.uniform(-1, 1) for _ in range(5))
-    names = [one.name for one in model.states]
-    states = [z if "bristle" in name else lag for name in names]
-    assert len(states) == 2
-    rates, out = model.equations(0.3, states, [tau, q, v], [one.start for one in model.parameters])
-    level = 1.5 + 0.5 * math.exp(-((v / 0.1) ** 2))
-    bent = v - abs(v) * z / level
-    better = (lag - (z + 4.0 * bent + 2.0 * v) - 3.0 * (q - 0.2)) / 2.6
-    resisting = math.tanh(v / 1e-3) + 3.0 * v
-    assert float(out) == pytest.approx(better * 2.0 + resisting, rel=1e-9)
-    expected = {"bristle": 1e3 * bent, "lag": (tau - lag) / 4e-3}
-    told = [expected["bristle" if "bristle" in name else "lag"] for name in names]
-    np.testing.assert_allclose(rates.full().ravel(), told, rtol=1e-9)
-    assert Motion(0.0, q, v, q).payload == 0.0
