@@ -30,7 +30,10 @@ def test_versions_abilities_extras_and_caches_are_listed(
     assert "fmus" in said
 
 
-def test_what_is_missing_comes_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_missing_comes_with_the_command_that_installs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path))
     there = looked._version_of
     gone = {"asammdf", "ziglang", "casadi"}
     monkeypatch.setattr(looked, "_version_of", lambda name: "" if name in gone else there(name))
