@@ -40,10 +40,10 @@ from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.renaming import by_each_name, is_renamed
-from cosim.diagnosis.search.rivals import Examined, examine
+from cosim.diagnosis.search.rivals import Examined, searched_and_examined
 from cosim.diagnosis.search.scores import scores_of, shaken_everywhere
 from cosim.diagnosis.search.sizes import standard_errors
-from cosim.diagnosis.search.stages import InTurn, search
+from cosim.diagnosis.search.stages import InTurn
 from cosim.diagnosis.terms.closed_form import ClosedForm, searches
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.trust.admission import admit
@@ -157,7 +157,7 @@ def diagnose(
     if any(one.blocks_naming for one in beyond_denial(sanity)):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     comparison = Comparison.of(problem, base, POLICY)
-    examined = _examined(comparison, base, refits or InTurn(on_progress))
+    examined = searched_and_examined(comparison, base, refits or InTurn(on_progress))
     sanity = without_denied(sanity, examined.chosen, examined.last)
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
@@ -211,12 +211,6 @@ def _refitted(train: Sequence[Recording], heldout: Sequence[Recording], card: Ca
     return *with_held(problem, base), late
 
 
-def _examined(comparison: Comparison, base: Fit, refits: InTurn) -> Examined:
-    """What the search finds, each effect of it challenged."""
-    with refits as several:
-        return examine(comparison, search(comparison, base, several), several)
-
-
 def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:
     return Outcome(withheld, refitted, refitted, refitted, refitted)  # nothing is named
 
@@ -231,9 +225,10 @@ def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldo
     band, whole = band_of(held), answer.proof.chosen
     unvetoed = heldout_rms(heldout, examined.chosen.mount, band)
     possible = None if whole is answer.chosen else heldout_rms(heldout, whole.mount, band)
-    tested = global_test(answer.comparison, examined.base).as_json()
+    tested = global_test(answer.comparison, examined.base)
     held = replace(held, unvetoed_rms=unvetoed, possible_rms=possible, confidence_interval=interval)
-    return replace(described, global_test=tested, heldout=held)
+    told = (*described.data_quality, *examined.ended)
+    return replace(described, global_test=tested, heldout=held, data_quality=told)
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:
@@ -258,7 +253,6 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     problem, decision = answer.comparison.problem, answer.decision
     seen = measured(problem, answer.models(), train, heldout)
     found = _findings(answer, seen.traces)
-    bias = loop_bias(problem.prepared, answer.chosen, problem.weight)
     policy = answer.comparison.policy
     left = beyond_any_machine(answer.scores.rest, policy)
     rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
@@ -278,7 +272,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         broadband=_shaken(answer),
         data_quality=(*card.remarks(), *seen.data_quality),
         friction_law=proposed_law(problem, answer.chosen),
-        loop_bias=bias.as_json() if bias else {},
+        loop_bias=loop_bias(problem.prepared, answer.chosen, problem.weight),
         ledger=finished(answer.comparison, answer.held, answer.proof.chosen),
         scores=answer.scores,
     )

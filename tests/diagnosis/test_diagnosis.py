@@ -102,7 +102,7 @@ class TestCommand:
         page = (out / "report.html").read_text()
         assert "<html" in page
         assert "not passive" in printed["data_quality"][0]
-        assert "Notes on the card and the recordings" in page
+        assert "Notes on the card, the recordings and the search" in page
         assert "it is not passive" in page
         versions = {
             path.stem[-5:] == "_fmi2": read_model_description(str(path)).fmiVersion for path in out.glob("*.fmu")

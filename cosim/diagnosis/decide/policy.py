@@ -86,6 +86,15 @@ class Policy:
     6 that were played after that 6; of 9 others 2."""
 
     @property
+    def most_structures(self) -> int:
+        """Structures beside which all effects are asked for, then what stands is taken as it is. Unit: 1.
+
+        As many as `most_effects` need, each added and each taken out once. Of 175 answers (150 rough machines, 25
+        recordings) half needed two, none more than six.
+        """
+        return 2 * self.most_effects
+
+    @property
     def least_uneven(self) -> float:
         """What a friction level must differ by over position, relative to itself (amplitude), to be physics. Unit: 1.
 

@@ -11,8 +11,6 @@ well: on simulated cases sigma0 moved in none of 5 with a bristle, by 10 to 36 %
 Reference: Wooldridge, Introductory Econometrics, section 15.5.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import fdtrc
 
@@ -31,27 +29,10 @@ RCOND = 1e-8
 """Directions weaker than this share of the strongest are not estimated."""
 
 
-@dataclass(frozen=True)
-class LoopBias:
-    """p value of "no bias", and the parameters that instruments would move, with the relative move."""
-
-    p_value: float
-    moved: dict[str, float]
-
-    @property
-    def is_biased(self) -> bool:
-        """Whether the estimates move, significantly and by much."""
-        return self.p_value < SIGNIFICANT and bool(self.moved)
-
-    def as_json(self) -> BiasEntry:
-        """The members under their names."""
-        return {"biased": self.is_biased, "p_value": self.p_value, "moved": self.moved}
-
-
-def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> LoopBias | None:
-    """Test a fit for bias by the loop; None where no set point was recorded or it tells of no parameter."""
+def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> BiasEntry:
+    """Test a fit for bias by the loop; nothing where no set point was recorded or it tells of no parameter."""
     if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
-        return None
+        return {}
     asked = [on_set_point(piece) for piece in prepared.pieces]
     _, along = stacked(Inverse(found.mount, found.free), asked, found.values)
     slopes, residual = found.slopes * weight[:, None], found.residual * weight
@@ -61,7 +42,7 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> LoopBias | None:
     names = [name for name, ok in zip(found.free, told, strict=True) if ok]
     blocks = Blocks.of(prepared, BLOCK_SECONDS)
     if not names or len(blocks.rows) < 2 * len(names):
-        return None
+        return {}
     return _tested(slopes[:, told], (slopes - explained)[:, told], residual, blocks, names, found.values[told])
 
 
@@ -71,7 +52,7 @@ def _projection(instruments: Array, columns: Array) -> Array:
     return np.asarray(unit @ np.linalg.lstsq(unit, columns, rcond=RCOND)[0])
 
 
-def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: list[str], values: Array) -> LoopBias:
+def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: list[str], values: Array) -> BiasEntry:
     columns = np.column_stack([slopes, rest])
     scale = np.sqrt((columns**2).sum(0)) + 1e-300
     scaled = columns / scale
@@ -84,4 +65,5 @@ def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: 
     moves = beta[:many] / scale[:many] / np.where(values == 0, 1.0, np.abs(values))
     far = (np.abs(moves) > POLICY.slight) & (np.abs(beta[:many]) > SURELY * errors)
     moved = {name: float(move) for name, move, is_far in zip(names, moves, far, strict=True) if is_far}
-    return LoopBias(float(fdtrc(many, count - 1, wald)), moved)
+    p = float(fdtrc(many, count - 1, wald))
+    return {"biased": p < SIGNIFICANT and bool(moved), "p_value": p, "moved": moved}

@@ -10,7 +10,6 @@ something that is missing: the test is reported and decides nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import log
 from typing import Any
 
@@ -33,21 +32,12 @@ ALPHA = 0.05
 """Share of the nulls above the threshold that is told."""
 
 
-@dataclass(frozen=True)
-class GlobalTest:
-    """The largest score of the catalogue, what a null exceeds in 5 %, and how often a null exceeds the former."""
+def global_test(comparison: Comparison, base: Fit) -> dict[str, float]:
+    """Score the whole catalogue beside the refitted base, and in nulls of the same residual with random signs.
 
-    statistic: float
-    threshold: float
-    p: float
-
-    def as_json(self) -> dict[str, float]:
-        """As diagnosis.json holds it."""
-        return {"statistic": self.statistic, "threshold": self.threshold, "p": self.p}
-
-
-def global_test(comparison: Comparison, base: Fit) -> GlobalTest:
-    """Score the whole catalogue beside the refitted base, and in nulls of the same residual with random signs."""
+    Returns:
+        The largest score of the catalogue, what a null exceeds in 5 %, and how often a null exceeds the former.
+    """
     prepared, level = comparison.problem.prepared, np.abs(comparison.nuisances.level)
     tried = candidates(base.mount, prepared, base.residual, level)
     columns = columns_of(base.mount, tried, prepared, base.values)
@@ -57,7 +47,7 @@ def global_test(comparison: Comparison, base: Fit) -> GlobalTest:
     parts = (signs[:, first : first + AT_ONCE] for first in range(0, DRAWS, AT_ONCE))
     null = np.concatenate([scores.of(some * scores.residual[:, None]) for some in parts])
     p = (1 + int(np.sum(null >= statistic))) / (1 + DRAWS)
-    return GlobalTest(statistic, float(np.quantile(null, 1 - ALPHA)), p)
+    return {"statistic": statistic, "threshold": float(np.quantile(null, 1 - ALPHA)), "p": p}
 
 
 class Scores:

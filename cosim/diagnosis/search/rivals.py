@@ -23,6 +23,7 @@ from cosim.diagnosis.search.stages import (
     is_full,
     is_small,
     margin,
+    search,
     stage,
     weighed,
 )
@@ -31,6 +32,10 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 ROUNDS = 4
+NOT_ASKED = "whether another one takes a place in the last of them was not asked."
+
+Stages = dict[tuple[str, ...], Stage]
+"""What was tried beside each structure, by the names of its effects."""
 
 
 @dataclass(frozen=True)
@@ -77,28 +82,58 @@ class Examined:
     effects: tuple[AcceptedEffect, ...]
     last: Stage
     """What was tried beside the structure that stands."""
+    ended: tuple[str, ...] = ()
+    """What was not asked, in a sentence, where a bound ended the search."""
+
+
+def searched_and_examined(comparison: Comparison, base: Fit, refits: InTurn) -> Examined:
+    """What a search finds, each effect of it challenged."""
+    with refits:
+        return examine(comparison, search(comparison, base, refits), refits)
 
 
 def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> Examined:
-    """Take out, challenge and swap, and add what has evidence beside what was swapped in, until nothing changes."""
+    """Take out, challenge and swap, and add what has evidence beside what was swapped in, until nothing changes.
+
+    Where swaps go in a circle, or everything was asked beside `most_structures`, what stands is examined as it is.
+    """
     chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
     for _ in range(ROUNDS):
         effects, better = _round(comparison, chosen, known, refits)
         if better is None:
             better = _grown(comparison, effects, _stage_after(comparison, chosen, known, refits))
         if better is None:
-            break
+            return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits))
         chosen = better
-    else:  # swaps went in a circle: what stands is examined as it is
-        effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
-    return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits))
+        if len(known) >= comparison.policy.most_structures:
+            break
+    ended = f"The search ended after all effects had been tried beside {len(known)} structures: {NOT_ASKED}"
+    effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
+    return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits), (ended,))
 
 
-def _stage_after(comparison: Comparison, fit: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn) -> Stage:
-    """What was tried beside a structure, found once."""
+def _stage_after(
+    comparison: Comparison, fit: Fit, known: Stages, refits: InTurn, stands: CandidateFit | None = None
+) -> Stage:
+    """What was tried beside a structure, found once; `stands`: an effect that is fitted beside it already."""
     if _names(fit) not in known:
-        known[_names(fit)] = stage(comparison, fit, refits)
+        known[_names(fit)] = stage(comparison, fit, refits, stands)
     return known[_names(fit)]
+
+
+def _without(
+    comparison: Comparison, chosen: Fit, group: tuple[Effect, ...], known: Stages, refits: InTurn
+) -> tuple[Stage, CandidateFit]:
+    """What was tried beside a structure without one of its effects, and that effect there.
+
+    It is not fitted once more, but for what other forms of it may tell: multiples of a ripple, a coupling's.
+    """
+    without = comparison.problem.without(chosen, group[0].name)
+    own = weighed(comparison, chosen, without, effect=group[0])
+    is_one = len(group) == 1 and not group[0].source
+    beside = _stage_after(comparison, without, known, refits, own if is_one else None)
+    same = beside.current is without
+    return beside, own if same else weighed(comparison, chosen, beside.current, effect=group[0])
 
 
 def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
@@ -112,7 +147,7 @@ def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: St
 
 
 def _round(
-    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn
+    comparison: Comparison, chosen: Fit, known: Stages, refits: InTurn
 ) -> tuple[list[AcceptedEffect], Fit | None]:
     effects = []
     for group in grouped(comparison, chosen):
@@ -165,14 +200,13 @@ def _challenged(
     comparison: Comparison,
     chosen: Fit,
     group: tuple[Effect, ...],
-    known: dict[tuple[str, ...], Stage],
+    known: Stages,
     refits: InTurn,
 ) -> AcceptedEffect:
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    beside = _stage_after(comparison, problem.without(chosen, group[0].name), known, refits)
-    own = weighed(comparison, chosen, beside.current, effect=group[0])
+    beside, own = _without(comparison, chosen, group, known, refits)
     others = [one for one in beside.tried if one.effect.name != group[0].name]
     if len(rest) > len(problem.mount.effects):
         standing = replace(chosen.mount, effects=rest)
@@ -206,8 +240,8 @@ def refitted_from_here(comparison: Comparison, rest: Mount, without: Fit, one: C
 
     Alone the others go where they do for what was taken out, and with a rival a fit may not come back.
     """
-    found = comparison.problem.fit(replace(rest, effects=(*rest.effects, one.effect)), 36)
-    again = weighed(comparison, found, without, one.many)
+    found = comparison.problem.roughly.fit(replace(rest, effects=(*rest.effects, one.effect)), 36)
+    again = replace(weighed(comparison, found, without, one.many), is_rough=True)
     return again if again.evidence > one.evidence else one
 
 

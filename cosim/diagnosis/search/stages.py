@@ -100,9 +100,12 @@ class InTurn:
 IN_TURN = InTurn()
 
 
-def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Stage:
-    """Screen all candidates beside a structure and refit the best forms."""
-    fits = refits(comparison, current, starts(comparison.screen(current), comparison.policy))
+def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN, stands: CandidateFit | None = None) -> Stage:
+    """Screen all candidates beside a structure and refit the best forms; `stands`: one that is fitted already."""
+    worth = starts(comparison.screen(current), comparison.policy)
+    if stands is not None:
+        worth = [one for one in worth if one[0].name != stands.effect.name]
+    fits = [*refits(comparison, current, worth), *([] if stands is None else [stands])]
     top = max((one.evidence for one in fits), default=0.0)
     near = max(comparison.policy.fair, top - comparison.policy.clear)
     fits = [at_its_end(comparison, one, current) if one.evidence > near else one for one in fits]

@@ -61,7 +61,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         gains: dict[str, float] | None = None,
         undecided: tuple[str, ...] = (),
     ) -> Examined:
-        def stage(comparison: Any, current: Fitted, told: Any) -> Tried:
+        def stage(comparison: Any, current: Fitted, told: Any, stands: Any = None) -> Tried:
             return Tried(current, tuple((tried or {}).get("".join(sorted(current.names)), [])))
 
         def weighed(comparison: Any, chosen: Fitted, before: Fitted, effect: Named) -> Candidate:
@@ -182,6 +182,23 @@ def test_swaps_that_go_in_a_circle_end(play: Play) -> None:
     found = play("x", {"x": 20.0, "r": 20.0}, tried)
     assert chosen(found) in ("bx", "br")
     assert len(found.effects) == 1
+    assert found.ended, "and it is said"
+
+
+def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(
+    play: Play, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bound is a count of structures, the same on each machine; what stands is examined as it is."""
+    p, q = (replace(rival(name, 900.0, beside=beside), adds=True) for name, beside in (("p", "br"), ("q", "brp")))
+    beside = {"b": [rival("r", 60.0)], "br": [p], "bpr": [q]}
+    worth = {"x": 50.0, "r": 60.0, "p": 900.0, "q": 900.0}
+    free = play("x", worth, beside)
+    assert (chosen(free), free.ended) == ("brpq", ())
+    monkeypatch.setattr(Tables, "policy", replace(RULES, most_effects=1))
+    stopped = play("x", worth, beside)
+    assert chosen(stopped) == "brp", "what was found by then stands, what has evidence beside it is not asked for"
+    assert [one.effect.id for one in stopped.effects] == ["r", "p"], "each is challenged"
+    assert "beside 2 structures" in stopped.ended[0]
 
 
 def accepted(**more: Any) -> AcceptedEffect:
