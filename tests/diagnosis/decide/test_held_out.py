@@ -208,7 +208,7 @@ def beside(effect: Effect, **more: Any) -> CandidateFit:
 def offset(monkeypatch: pytest.MonkeyPatch, rival: CandidateFit) -> AcceptedEffect:
     """The offset that was found, challenged by what was tried in its place."""
     comparison, base, found = compared()
-    monkeypatch.setattr(rivals, "stage", lambda _, fit, __: Stage(fit, () if fit.mount.effects else (rival,)))
+    monkeypatch.setattr(rivals, "stage", lambda _, fit, *__: Stage(fit, () if fit.mount.effects else (rival,)))
     (one,) = examine(comparison, Search(base, (Stage(found, ()),))).effects
     return one
 

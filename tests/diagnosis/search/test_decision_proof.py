@@ -8,8 +8,7 @@ import pytest
 from named_structures import Fitted, Named, Structure, Tables, fitted
 
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.search.alternatives import prove_sets
-from cosim.diagnosis.search.proof import Proof, prove
+from cosim.diagnosis.search.proof import Proof, prove, prove_sets
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
 from cosim.diagnosis.search.stages import CandidateFit
 
@@ -21,7 +20,7 @@ def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """Effects that are only their names are never anything else in disguise, and their sizes are told."""
     monkeypatch.setattr("cosim.diagnosis.search.proof.is_degenerate", lambda *_: False)
     monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda *_: True)
-    monkeypatch.setattr("cosim.diagnosis.search.alternatives.contest", lambda _, one, two: one.evidence - two.evidence)
+    monkeypatch.setattr("cosim.diagnosis.search.proof.contest", lambda _, one, two: one.evidence - two.evidence)
 
 
 @dataclass(frozen=True)

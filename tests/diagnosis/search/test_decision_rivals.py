@@ -194,7 +194,7 @@ def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(
     worth = {"x": 50.0, "r": 60.0, "p": 900.0, "q": 900.0}
     free = play("x", worth, beside)
     assert (chosen(free), free.ended) == ("brpq", ())
-    monkeypatch.setattr(Tables, "policy", replace(RULES, most_effects=1))
+    monkeypatch.setattr(Ruled, "policy", replace(RULES, most_effects=1))
     stopped = play("x", worth, beside)
     assert chosen(stopped) == "brp", "what was found by then stands, what has evidence beside it is not asked for"
     assert [one.effect.id for one in stopped.effects] == ["r", "p"], "each is challenged"
