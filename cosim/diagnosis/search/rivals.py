@@ -32,7 +32,8 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 ROUNDS = 4
-NOT_ASKED = "whether another one takes a place in the last of them was not asked."
+NOT_ASKED = "whether another effect takes a place in what stands was not asked."
+CHANGED_PLACES = f"Effects changed places {ROUNDS} times, and the search ended: {NOT_ASKED}"
 
 Stages = dict[tuple[str, ...], Stage]
 """What was tried beside each structure, by the names of its effects."""
@@ -98,6 +99,7 @@ def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> 
     Where swaps go in a circle, or everything was asked beside `most_structures`, what stands is examined as it is.
     """
     chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
+    ended = CHANGED_PLACES
     for _ in range(ROUNDS):
         effects, better = _round(comparison, chosen, known, refits)
         if better is None:
@@ -106,8 +108,8 @@ def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> 
             return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits))
         chosen = better
         if len(known) >= comparison.policy.most_structures:
+            ended = f"The search ended after all effects had been tried beside {len(known)} structures: {NOT_ASKED}"
             break
-    ended = f"The search ended after all effects had been tried beside {len(known)} structures: {NOT_ASKED}"
     effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
     return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits), (ended,))
 

@@ -182,7 +182,7 @@ def test_swaps_that_go_in_a_circle_end(play: Play) -> None:
     found = play("x", {"x": 20.0, "r": 20.0}, tried)
     assert chosen(found) in ("bx", "br")
     assert len(found.effects) == 1
-    assert found.ended, "and it is said"
+    assert found.ended[0].startswith("Effects changed places 4 times"), "and it is said"
 
 
 def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(
