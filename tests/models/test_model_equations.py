@@ -1,4 +1,4 @@
-"""Whole models against their equations: a plant with all that can stand in a row, set points, pointing, correction."""
+"""Whole models against their equations: a plant with all that can stand in a row, set points, pointing."""
 
 import math
 from itertools import product
