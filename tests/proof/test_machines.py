@@ -167,3 +167,14 @@ def test_a_rough_null_has_other_friction_than_a_smooth_one() -> None:
     tau = [case.train[0]["tau"].to_numpy() for case in (smooth, rough)]
     off = float(np.sqrt(np.mean((tau[1] - tau[0]) ** 2) / np.mean(tau[0] ** 2)))
     assert 0.001 < off < 0.2
+
+
+def test_a_loop_that_swings_up_is_no_machine_and_another_is_drawn() -> None:
+    """Of this seed a robot joint whose torque comes 3 ms late to a loop that is too fast for that: 1e72 N m."""
+    given = {"duration": 60.0, "machine": ANY, "rough": True}
+    case = make_case(545360700, ["gravity_unbalance", "delay"], 0.6017380760297837, **given)
+    assert case.truth["seed"] == 545360700
+    assert case.truth["verdict"] == ["gravity_unbalance", "delay"]
+    reach = case.truth["pace"]["amplitude"]
+    for table in (*case.train, case.heldout):
+        assert np.abs(table["q"]).max() < 5 * reach
