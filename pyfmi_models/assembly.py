@@ -18,6 +18,7 @@ import casadi as ca
 
 from pyfmi_models.effects.base import (
     NOTHING,
+    Balance,
     ClockEffect,
     Coupling,
     DriveEffect,
@@ -180,6 +181,23 @@ class Assembly:
         for effect, seen in self.seeing(FrictionEffect, motion, states):
             level = effect.level(level, seen)
         return level
+
+    def driven(self, motion: Motion, push: Scalar, states: Mapping[str, Any] = NOTHING) -> Motion:
+        """The motion under a torque [N m] that is left for friction's contact and inertia, where a level feels it.
+
+        The contact is taken to slide: so what accelerates the axis follows from the balance, without a loop.
+        """
+        return self._balanced(motion, push, ca.sign(motion.v), states)
+
+    def accelerated(self, motion: Motion, inertial: Scalar, states: Mapping[str, Any] = NOTHING) -> Motion:
+        """The same of a recorded motion, which needs a torque [N m] for its inertia."""
+        return self._balanced(motion, inertial, 0.0, states)
+
+    def _balanced(self, motion: Motion, push: Scalar, taken: Scalar, states: Mapping[str, Any]) -> Motion:
+        if not any(effect.feels_inertia for _, effect in self.of_kind(FrictionEffect)):
+            return motion
+        beside = self.viscous(motion, states) + self.loads(motion, states) - self.payload(motion, states)
+        return motion._replace(balance=Balance(push, taken, beside))
 
     def viscous(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Viscous torque [N m] after all friction effects."""

@@ -74,12 +74,13 @@ class _Side:
     def needed(self, motion: Motion, command: Scalar) -> tuple[Scalar, Scalar, Scalar, Any]:
         """Return inertia, resisting torque, the torque applied under a command, and the rates of all states."""
         this, own = self._mount.with_symbols(self._symbols, motion.v), self.own
-        level = this.level(motion, own)
-        resisting = this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
         applied, rates = this.applied(command, own, motion)
+        viscous, loads = this.viscous(motion, own), this.loads(motion, own)
+        level = this.level(this.driven(motion, applied - loads - viscous, own), own)
+        resisting = this.law.contact(own["friction"], motion.v, level) + viscous
         rates |= {name: one.rate(motion._replace(state=own[name])) for name, one in this.of_kind(MotionEffect)}
         rates |= {"friction": this.law.rate(own["friction"], motion.v, level)}
-        return this.axis.inertia, resisting + this.loads(motion, own), applied, ca.vertcat(*(rates[n] for n in own))
+        return this.axis.inertia, resisting + loads, applied, ca.vertcat(*(rates[n] for n in own))
 
 
 def _of(mount: Mount, side: str, owner: str, state: Variable) -> Variable:

@@ -69,10 +69,11 @@ def written(mount: Assembly) -> tuple[list[Any], Any, dict[str, Scalar]]:
     this = mount.with_symbols(symbols, v)
     motion = this.at(t, q, v, given)
     applied, rates = this.applied(given["tau"], own, motion)
-    level = this.level(motion, own)
-    friction = this.law.contact(own["friction"], v, level) + this.viscous(motion, own)
     motors, inertia, push = _motors(this, applied, own)
-    push = push - given["disturbance"] - this.loads(motion, own) - friction
+    viscous, push = this.viscous(motion, own), push - given["disturbance"] - this.loads(motion, own)
+    level = this.level(this.driven(motion, push - viscous, own), own)
+    friction = this.law.contact(own["friction"], v, level) + viscous
+    push = push - friction
     acceleration, twisting = _accelerations(this, motion, [*motors, *_behind(this, motion, inertia, push, own)], own)
 
     rates |= {name: effect.rate(motion._replace(state=own[name])) for name, effect in this.of_kind(MotionEffect)}

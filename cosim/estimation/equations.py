@@ -81,7 +81,12 @@ class Equations:
         for name, states in self._owners:
             own[name] = s["state"][first : first + len(states)]
             first += len(states)
-        return this, motion, own
+        return this, this.accelerated(motion, self._inertial(this, motion, own), own), own
+
+    def _inertial(self, this: Mount, motion: Motion, own: Mapping[str, Any]) -> Any:
+        """What accelerates the axis, by the near side's inertia [N m]."""
+        near = this.inertia(this.axis.inertia, motion, own)
+        return near * self._symbols["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
 
     def _true(self, expression: Any) -> Any:
         """Put the true motion in: position, speed and acceleration behind the reading's."""
@@ -109,8 +114,7 @@ class Equations:
 
     def _torque(self) -> Tape:
         s, (this, motion, own) = self._symbols, self._known
-        level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
-        torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
+        level, torque = this.level(motion, own), self._inertial(this, motion, own)
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
         torque = self._true(_command(this, torque + this.loads(motion, own), motion))
         by_state, by_free = ca.jacobian(torque, s["state"]), ca.jacobian(torque, s["free"])

@@ -32,12 +32,24 @@ from pyfmi_models.model import Part, Scalar, Variable
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
+class Balance(NamedTuple):
+    """Torques of a moment [N m], the friction level not known yet: what accelerates the axis is push - taken level.
+
+    A recording tells that, so `taken` is 0 there; under a torque a sliding contact takes the level, with the sign of
+    the speed. `beside` is all else that resists but the weights, of which `payload` tells.
+    """
+
+    push: Scalar = 0.0
+    taken: Scalar = 0.0
+    beside: Scalar = 0.0
+
+
 class Motion(NamedTuple):
     """Where the axis is, and whatever else the effect that is asked may look at.
 
     Time [s], position [rad or m], speed, and position as an angle that repeats once per turn of a rotary axis and once
     per metre of a linear one; values of the inputs that effects declare, by name; torque of the weights on the axis
-    [N m]; the states of the effect that is asked, a column in the order of its `states()`.
+    [N m]; the states of the effect that is asked, a column in the order of its `states()`; what accelerates the axis.
     """
 
     t: Scalar
@@ -47,6 +59,7 @@ class Motion(NamedTuple):
     inputs: Mapping[str, Scalar] = NOTHING
     payload: Scalar = 0.0
     state: Any = ()
+    balance: Balance = Balance()
 
 
 def times(count: float) -> str:
@@ -178,6 +191,8 @@ class FrictionEffect(MotionEffect):
     """A change of the contact, of the friction level or of the viscous torque."""
 
     place: ClassVar[str] = "Friction"
+    feels_inertia: ClassVar[bool] = False
+    """Whether the level depends on the balance of the motion."""
 
     def law(self, law: FrictionLaw) -> FrictionLaw:
         """Return the law that replaces `law`."""

@@ -8,6 +8,9 @@ import casadi as ca
 from pyfmi_models.effects.base import FrictionEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
+LEAST_LEFT = 0.1
+"""Of what goes through a gear friction takes 1 - this at most: with all of it the gear would lock."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LoadDependentFriction(FrictionEffect):
@@ -61,3 +64,46 @@ class LoadScaledFriction(LoadDependentFriction):
         """Return the same friction, its rise given at another Coulomb level [N m]."""
         rise = float(self.coulomb_per_Nm) * level / float(self.at_level)
         return replace(self, coulomb_per_Nm=rise, at_level=level)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearLoadFriction(LoadScaledFriction):
+    """What accelerates the axis passes the teeth too: level' = level (1 + c |through| / Fc).
+
+        through = payload + inertia_share J q'' + friction_share (friction' + all other loads)
+
+    Both shares are 1 where the teeth feel the motor's torque, friction_share is 0 where they feel what arrives at the
+    load. Neither is fitted. Friction is in `through` and `through` in friction; with a contact that slides and what
+    accelerates the axis = push - taken level', which the balance of the moment gives, that is solved in closed form:
+
+        through = given + taking c level / Fc |through|,   taking = friction_share sign v - inertia_share taken
+
+    An effect further down the card that changes the level again is not in that balance.
+    References: Wolf and Iskandar, "Extending a dynamic friction model with nonlinear viscous and thermal dependency
+    for a motor and harmonic drive gear", ICRA 2018; Pagani, Legnani, Incerti, Gheza, "Evaluation and modeling of the
+    friction in robotic joints considering thermal effects", J. Mechanisms Robotics 12 (2020) 021108.
+    """
+
+    equation: ClassVar[str] = "F (1 + c |torque through the gear| / Fc)"
+    to_record: ClassVar[str] = "record quick starts and stops, and the same speeds without them"
+    rivals: ClassVar[tuple[str, ...]] = ("torque_saturation", "position_friction", "gravity_unbalance")
+    told_apart_by: ClassVar[str] = "it takes more of what brakes the axis too; a drive at its limit gives less of that"
+    action: ClassVar[str] = "Look at the gear's lubrication, preload and wear; else keep it in the model."
+    feels_inertia: ClassVar[bool] = True
+    inertia_share: Scalar = parameter("1", "Share of the axis' inertia behind the gear", low=0, high=1, fitted=False)
+    friction_share: Scalar = parameter(
+        "1", "Share of friction and of other loads behind the gear", default=0.0, low=0, high=1, fitted=False
+    )
+
+    def level(self, level: Scalar, motion: Motion) -> Scalar:
+        """The equations above."""
+        push, taken, beside = motion.balance
+        taking = self.friction_share * ca.sign(motion.v) - self.inertia_share * taken
+        given = motion.payload + self.inertia_share * push + self.friction_share * beside + taking * level
+        rise = self.coulomb_per_Nm * level / self.at_level
+        return level + rise * ca.fabs(given) / ca.fmax(1 - rise * taking * ca.sign(given), LEAST_LEFT)
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        rise = f"{self.coulomb_per_Nm:.2g} {unit} for each {unit}"
+        return f"Friction rises by {rise} through the gear, to hold a load or to move it."

@@ -45,6 +45,7 @@ NEUTRAL = {
     "CableWrap": {"stiffness": 0.0},
     "InertiaVariation": {"relative_amplitude": 0.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.0},
+    "GearLoadFriction": {"coulomb_per_Nm": 0.0},
     "GearFriction": {"driving": 0.0, "driven": 0.0},
     "BoucWen": {"torque": 0.0},
     "TorqueDroop": {"droop": 0.0},

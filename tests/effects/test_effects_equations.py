@@ -79,6 +79,17 @@ def gear(e: Any, m: Motion, level: float) -> float:
     return level + (e.driving if way > 0 else e.driven) * abs(m.payload)
 
 
+def through(e: Any, m: Motion, level: float) -> float:
+    """The root of g = level (1 + c/Fc |payload + s push + f beside + taking g|), halved to from both sides."""
+    taking = e.friction_share * sign(m.v) - e.inertia_share * m.balance.taken
+    given = m.payload + e.inertia_share * m.balance.push + e.friction_share * m.balance.beside
+    low, high = level, 100 * (abs(level) + abs(given))
+    for _ in range(200):
+        middle = (low + high) / 2
+        low, high = (middle, high) if middle < level * (1 + 0.1 * abs(given + taking * middle)) else (low, middle)
+    return low
+
+
 def spot(e: Any, m: Motion, level: float) -> float:
     rise = (e.forward + e.backward) / 2 if m.v == 0 else e.forward if m.v > 0 else e.backward
     return level * (1 + rise * bump((m.q - e.q_center) / e.width))
@@ -91,6 +102,7 @@ LEVELS: dict[str, Callable[[Any, Motion, float], float]] = {
     "LocalFriction": lambda e, m, g: g * (1 + 0.3 * bump((m.q - 1) / 0.05)),
     "RoughSpot": spot,
     "GearFriction": gear,
+    "GearLoadFriction": through,
     "LoadDependentFriction": lambda e, m, g: g + 0.2 * abs(m.payload),
     "LoadScaledFriction": lambda e, m, g: g * (1 + 0.1 * abs(m.payload) / 2),
     "DwellBreakaway": lambda e, m, g: g + 0.3 * math.log(1 + m.state[0] / 0.1),

@@ -20,7 +20,7 @@ from pyfmi_models.effects import (
     StribeckEffect,
 )
 from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
 from pyfmi_models.friction import Coulomb, Frictionless, LuGre
@@ -159,6 +159,19 @@ def test_friction_grows_with_the_weights_on_the_axis_and_with_nothing_else() -> 
     assert torque(effect, Cogging(cycles_per_rev=4, amplitude=9.0), disturbance=7.0) == pytest.approx(1.6)
     two = (weight, GravityUnbalance(mgl=5.0, phase=0.1 + np.pi))  # that balance each other
     assert torque(effect, *two, q=1.0) == pytest.approx(1.6)
+
+
+@pytest.mark.parametrize(("inertia", "others"), [(1.0, 0.0), (0.4, 0.0), (1.0, 1.0), (0.7, 0.4)])
+def test_friction_of_a_gear_grows_with_all_that_goes_through_its_teeth(inertia: float, others: float) -> None:
+    """Whatever the torque: lifting, lowering, driving and braking, the axis accelerates as the friction then says."""
+    effect = GearLoadFriction(coulomb_per_Nm=0.2, at_level=1.0, inertia_share=inertia, friction_share=others)
+    effects = (GravityUnbalance(mgl=5.0, phase=0.1), Cogging(cycles_per_rev=4, amplitude=0.8), effect)
+    for q, v, tau in product((-1.0, 1.4), (-0.5, 0.2), (-20.0, -4.0, 0.0, 3.0, 15.0)):
+        found = evaluate(mount(*effects).model(), position=q, speed=v, tau=tau)
+        weight, other = 5 * np.sin(q + 0.1), 0.8 * np.cos(4 * q)
+        through = weight + inertia * INERTIA * found["der(speed)"] + others * (found["friction"] + other)
+        assert found["friction"] == pytest.approx(np.sign(v) * (1 + 0.2 * abs(through)) + 3 * v, rel=1e-9)
+        assert INERTIA * found["der(speed)"] == pytest.approx(tau - found["friction"] - weight - other, rel=1e-9)
 
 
 def test_a_static_law_with_presliding_is_lugre() -> None:

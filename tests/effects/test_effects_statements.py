@@ -35,6 +35,7 @@ TURNING = {
     "LearnedDrive": "The drive gives up to 0.25 N·m less or more than its command; a table learned from data.",
     "LearnedHysteresis": "Something goes round a loop of 0.5 N·m either way; learned from data.",
     "LoadDependentFriction": "Friction rises by 0.2 N·m for each N·m of load on the axis.",
+    "GearLoadFriction": "Friction rises by 0.2 N·m for each N·m through the gear, to hold a load or to move it.",
     "LoadScaledFriction": "Friction rises by 0.1 N·m for each N·m of load on the axis.",
     "LocalFriction": "Around 1 rad friction is 30 % higher, over about 0.2 rad.",
     "PeriodicDisturbance": "Something shakes the axis 3 times a second with 0.6 N·m.",

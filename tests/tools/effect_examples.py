@@ -48,6 +48,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "AltitudeInertia": {"tube_inertia": 3.0},
     "AzimuthCentrifugal": {"tube_inertia": 3.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
+    "GearLoadFriction": {"coulomb_per_Nm": 0.2, "at_level": 2.0, "inertia_share": 0.7, "friction_share": 0.4},
     "GearFriction": {"driving": 0.3, "driven": 0.1},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
     "DeadBand": {"band": 0.5},

@@ -1,6 +1,6 @@
-"""Friction that grows with the weight on the bearings."""
+"""Friction that grows with the weight on the bearings, or with all torque through a gear."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -8,35 +8,51 @@ import numpy as np
 
 from cosim.diagnosis.effects.base import Hypothesis
 from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect, PayloadEffect
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction, LoadScaledFriction
+from pyfmi_models.effects.load_dependent_friction import (
+    LEAST_LEFT,
+    GearLoadFriction,
+    LoadDependentFriction,
+    LoadScaledFriction,
+)
 from pyfmi_models.mount import Mount
+
+SIDES = (0.0, 1.0)
+"""Share of friction that the teeth of a gear feel: none on the load's side of it, all on the motor's."""
 
 
 class LoadFriction(Hypothesis[LoadDependentFriction]):
     """A rise of the level alone, or of level and viscous friction alike."""
 
-    forms = (LoadDependentFriction, LoadScaledFriction)
+    forms = (LoadDependentFriction, LoadScaledFriction, GearLoadFriction)
     tables = ("friction level over position",)
     rank: ClassVar[float] = 5
     view = "load"
+    may_end = ("inertia_share", "friction_share")
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
-        """Only a known weight tells the load."""
-        if not has(mount, PayloadEffect):
-            return
-        forms = [LoadDependentFriction(coulomb_per_Nm=0.0)]
-        if level := contact_level(mount):
-            forms.append(LoadScaledFriction(coulomb_per_Nm=0.0, at_level=level))
+        """A known weight tells the load; what accelerates the axis passes a gear, on its load's or its motor's side."""
+        weight, level = has(mount, PayloadEffect), contact_level(mount)
+        forms = [LoadDependentFriction(coulomb_per_Nm=0.0)] if weight else []
+        if level:
+            known = {"coulomb_per_Nm": 0.0, "at_level": level}
+            forms += [LoadScaledFriction(**known)] if weight else []
+            forms += [GearLoadFriction(**known, inertia_share=1.0, friction_share=one) for one in SIDES]
         for form in forms:
+            most = 0.5 if form.feels_inertia else 5.0
 
-            def start(c: Array, form: LoadDependentFriction = form) -> Effect:
-                return replace(form, coulomb_per_Nm=float(np.clip(c[0], 1e-6, 5)))
+            def start(c: Array, form: LoadDependentFriction = form, most: float = most) -> Effect:
+                return replace(form, coulomb_per_Nm=float(np.clip(c[0], 1e-6, most)))
 
             yield Candidate("load_dependent_friction", (form,), ("coulomb_per_Nm",), start)
 
-    def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """It needs a weight of known size."""
-        known = has(mount, PayloadEffect) or mount.friction.key == "none"
-        return super().why_not(mount, prepared) if known else "the model holds no load that changes"
+    def is_plausible(self, effect: LoadDependentFriction, mount: Mount) -> bool:
+        """A gear leaves some of what goes through it."""
+        own = effect.told_at(contact_level(mount))
+        return not own.feels_inertia or float(own.coulomb_per_Nm) < 1 - LEAST_LEFT
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """What rises with the weight, where there is one: its size counts in another torque than a gear's."""
+        weights = [one for one in tried if type(one.instances[0]) is not GearLoadFriction]
+        return weights or tried

@@ -1,4 +1,4 @@
-"""Friction that grows with a load is asked of a card that states the load, wherever the load changes along the way."""
+"""Friction that grows with a load: with a weight that the card states, and with all torque that goes through a gear."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,14 @@ from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
+from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.diagnosis.search.sizes import Numbers
 from cosim.diagnosis.search.stages import Stage, best_of, refitted
 from cosim.estimation.fit import Fit
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects import Motion
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction, LoadScaledFriction
+from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction, LoadScaledFriction
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
 
 BASE = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
 PHASE = 0.2
@@ -62,10 +64,41 @@ def test_a_load_that_the_card_states_gives_a_bound_and_half_of_it_one_twice_as_l
     assert half.visible_from == pytest.approx(2 * whole.visible_from, rel=0.05)
 
 
-def test_without_a_load_in_the_card_it_is_not_testable_and_is_said_what_to_record() -> None:
+def test_without_a_load_in_the_card_what_accelerates_the_axis_loads_a_gear() -> None:
     one = answered(0.0)
-    assert (one.answer, one.evidence) == ("not_testable", "the model holds no load that changes")
-    assert one.action == "record with two different loads"
+    assert one.answer == "not_seen"
+    assert one.bound is not None
+    assert one.bound.unit == "% of the load"
+
+
+def geared(rise: float, inertia: float, others: float, seed: int) -> Recording:
+    """Quick moves of an axis without a weight, friction of which rises by so much per unit through its gear."""
+    t = np.arange(4000) / 200
+    v = 1.5 * np.sin(1.9 * t + seed) + 0.8 * np.sin(5.3 * t + 1)
+    q = -1.5 / 1.9 * np.cos(1.9 * t + seed) - 0.8 / 5.3 * np.cos(5.3 * t + 1)
+    a = 1.5 * 1.9 * np.cos(1.9 * t + seed) + 0.8 * 5.3 * np.cos(5.3 * t + 1)
+    friction = np.sign(v) + 3 * v
+    for _ in range(60):  # the friction is part of what goes through, which is part of friction
+        friction = (1 + rise * np.abs(inertia * 2 * a + others * friction)) * np.sign(v) + 3 * v
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(t))
+    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": 2 * a + friction + noise})
+
+
+@pytest.mark.parametrize("others", [0.0, 1.0])
+def test_a_gear_is_told_from_a_drive_that_gives_less_and_by_the_side_that_feels_the_torque(others: float) -> None:
+    problem = _problem([geared(0.15, 1.0, others, seed) for seed in (1, 2)], card(0.0))
+    base = problem.fit(problem.mount, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    sides = [
+        GearLoadFriction(coulomb_per_Nm=0.01, at_level=1.0, inertia_share=1.0, friction_share=one)
+        for one in (others, 1 - others)
+    ]
+    right, wrong, drive = (
+        refitted(comparison, base, one, 2) for one in (*sides, TorqueSaturation(knee_torque=8.0, slope=0.5))
+    )
+    assert right.effect.coulomb_per_Nm == pytest.approx(0.15, rel=0.1)  # type: ignore[attr-defined]
+    assert right.evidence > max(wrong.evidence, drive.evidence) + POLICY.clear
+    assert not is_degenerate(problem, right.effect)
 
 
 @pytest.mark.parametrize(("rise", "seen"), [(0.06, True), (0.002, False)])
