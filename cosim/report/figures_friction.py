@@ -94,7 +94,7 @@ def _force(law: FrictionLaw, effects: tuple[Effect, ...]) -> Force:
     def at(v: float) -> float:
         motion = mount.at(0.0, 0.0, v)
         this = mount.with_symbols({one.name: one.start for one in mount.parameters()}, v)
-        level = float(this.level(motion)) * float(np.sign(v))
+        level = float(this.level(this.accelerated(motion, 0.0))) * float(np.sign(v))
         return level + float(this.viscous(motion)) + float(this.loads(motion))
 
     return lambda speed: np.array([at(float(v)) for v in speed])

@@ -37,7 +37,7 @@ VIEWS = ("position", "one pitch", "slow and fast")
 def own_torque(finding: Finding, diagnosis: Diagnosis) -> Torque | None:
     """Return the torque of a finding with the numbers found; None where it is no function of position and speed."""
     first = effect_of(finding)
-    if first is None or first.inputs() or first.states():
+    if first is None or first.inputs() or first.states() or first.feels_inertia:
         return None
     effects = (first, *(replace(first, **harmonic) for harmonic in finding.harmonics))
     q, v = ca.SX.sym("q"), ca.SX.sym("v")

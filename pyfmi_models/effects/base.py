@@ -89,6 +89,8 @@ class Effect(Part):
     """Whether a torque added to the command can do what the effect does to the axis."""
     at_once: ClassVar[bool] = False
     """Whether it changes what the motion of each moment needs, not only what drive, springs and clocks make of that."""
+    feels_inertia: ClassVar[bool] = False
+    """Whether it depends on what accelerates the axis, which the balance of a motion tells."""
     id: ClassVar[str]
     title: ClassVar[str]
     equation: ClassVar[str] = ""
@@ -191,8 +193,6 @@ class FrictionEffect(MotionEffect):
     """A change of the contact, of the friction level or of the viscous torque."""
 
     place: ClassVar[str] = "Friction"
-    feels_inertia: ClassVar[bool] = False
-    """Whether the level depends on the balance of the motion."""
 
     def law(self, law: FrictionLaw) -> FrictionLaw:
         """Return the law that replaces `law`."""

@@ -54,5 +54,5 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """What rises with the weight, where there is one: its size counts in another torque than a gear's."""
-        weights = [one for one in tried if type(one.instances[0]) is not GearLoadFriction]
+        weights = [one for one in tried if not one.instances[0].feels_inertia]
         return weights or tried
