@@ -62,11 +62,11 @@ def test_a_doubtful_name_and_a_special_case_are_asked_from_the_general_side(prob
         assert nats(rated(problem, one))["slow sweep"] > 10.0
 
 
-def test_what_needs_another_load_is_shown_by_no_motion(problem: Problem) -> None:
+def test_what_needs_columns_of_a_neighbour_is_shown_by_no_motion(problem: Problem) -> None:
     ours = problem.fit(problem.mount, 5)
     motion = fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False))
     piece, _ = piece_of(motion, 0.0, problem.prepared.cutoff, LIMITS)
-    names = ("load_dependent_friction", "compliance")
+    names = ("axis_coupling", "compliance")
     assert shown_by_motion(names, ours, [piece], 0.1) == {"compliance"}
 
 
@@ -84,7 +84,7 @@ def test_what_could_not_be_tested_is_shown_before_new_ground_is_sought(problem: 
     slow = slow_sweep(room_of(LIMITS, 0.0, 12.0, 1, False))
     assert best([Plan(fast, (), 0.9, 0), Plan(slow, (), 0.2, 1)], False) == Plan(slow, (), 0.2, 1)
     ours = problem.fit(problem.mount, 5)
-    names = ("load_dependent_friction", "compliance")
+    names = ("axis_coupling", "compliance")
     found = plans(room_of(LIMITS, 0.0, 12.0, 1, False), problem, ours, [], LIMITS, 0.0, names)
     assert {one.motion.family: one.shows for one in found.plans}["fast tone"] == 1
 
