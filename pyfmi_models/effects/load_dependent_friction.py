@@ -90,6 +90,7 @@ class GearLoadFriction(LoadScaledFriction):
     told_apart_by: ClassVar[str] = "it takes more of what brakes the axis too; a drive at its limit gives less of that"
     action: ClassVar[str] = "Look at the gear's lubrication, preload and wear; else keep it in the model."
     feels_inertia: ClassVar[bool] = True
+    coulomb_per_Nm: Scalar = parameter("1", "Rise of the friction level per N m of load", low=0, high=1 - LEAST_LEFT)
     inertia_share: Scalar = parameter("1", "Share of the axis' inertia behind the gear", low=0, high=1, fitted=False)
     friction_share: Scalar = parameter(
         "1", "Share of friction and of other loads behind the gear", default=0.0, low=0, high=1, fitted=False

@@ -10,12 +10,7 @@ from cosim.diagnosis.effects.base import Hypothesis
 from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect, PayloadEffect
-from pyfmi_models.effects.load_dependent_friction import (
-    LEAST_LEFT,
-    GearLoadFriction,
-    LoadDependentFriction,
-    LoadScaledFriction,
-)
+from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction, LoadScaledFriction
 from pyfmi_models.mount import Mount
 
 SIDES = (0.0, 1.0)
@@ -46,11 +41,6 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
                 return replace(form, coulomb_per_Nm=float(np.clip(c[0], 1e-6, most)))
 
             yield Candidate("load_dependent_friction", (form,), ("coulomb_per_Nm",), start)
-
-    def is_plausible(self, effect: LoadDependentFriction, mount: Mount) -> bool:
-        """A gear leaves some of what goes through it."""
-        own = effect.told_at(contact_level(mount))
-        return not own.feels_inertia or float(own.coulomb_per_Nm) < 1 - LEAST_LEFT
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """What rises with the weight, where there is one: its size counts in another torque than a gear's."""
