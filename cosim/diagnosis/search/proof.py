@@ -128,8 +128,9 @@ def _standing(
 
     One that does not stand may be spoilt by another: the one that falls lowest is taken out, or the one that helps
     least, whichever leaves the better prediction in the end; but a way with one that halves the held-out error goes
-    before one that leaves it. The likelihood counts fast rows by the hundred: one that explains a few of them may be
-    ahead there, and leave the error as it was.
+    before one that leaves it, and of two such ways one that halves what the other leaves. The likelihood counts fast
+    rows by the hundred: one that explains a few of them may be ahead there, and leave the error as it was (11 of 910
+    nats, and eleven times the error energy, of an arm's weight).
     """
     problem, policy = comparison.problem, comparison.policy
     gains = {one.effect.name: _gain(problem, chosen, one, some, held) for one in some}
@@ -143,12 +144,18 @@ def _standing(
         rest = [one for one in some if one.effect.name != name]
         ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
 
-    def worth(way: tuple[Fit, list[AcceptedEffect], dict[str, Gain]]) -> tuple[bool, float]:
-        fit, those, known = way
-        return any(known[one.effect.name].matters_alone(policy) for one in those), held.predicted(fit)
+    def matters(way: tuple[Fit, list[AcceptedEffect], dict[str, Gain]]) -> bool:
+        return any(way[2][one.effect.name].matters_alone(policy) for one in way[1])
 
-    best, kept, known = max(ways, key=worth)
-    return best, kept, gains | known
+    best = max(ways, key=lambda way: (matters(way), held.predicted(way[0])))
+    others = [way for way in ways if way is not best and matters(way) == matters(best)]
+    fit, kept, known = next((way for way in others if _halves(way[0], best[0], held, policy)), best)
+    return fit, kept, gains | known
+
+
+def _halves(one: Fit, other: Fit, held: Predictive, policy: Policy) -> bool:
+    """Whether a structure leaves half of another's held-out error, and the likelihood does not clearly contradict."""
+    return gained(held.predicted(one) - held.predicted(other), other.mount, one.mount, held).halves(policy)
 
 
 def _is_validated(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:

@@ -130,6 +130,17 @@ def test_of_two_ways_one_that_halves_the_error_goes_before_one_that_leaves_it() 
     assert standing(proven(Held(nats, {"b": 1.0, "bx": 0.99, "by": 0.7, "bxy": 0.78}), "xy")) == "x"
 
 
+def test_of_two_ways_that_halve_the_error_one_that_halves_what_the_other_leaves_goes_first() -> None:
+    """The first is spoilt by the second, which helps least beside it."""
+
+    def left(error: float, nats: float = 899.0) -> str:
+        tables = Held({"b": 0, "bx": 910, "by": nats, "bxy": 927}, {"b": 1, "bx": 0.499, "by": error, "bxy": 0.49})
+        return standing(proven(tables, "xy"))
+
+    assert (left(0.2), left(0.3)) == ("y", "x")
+    assert (left(0.1, 860.0), left(0.04, 860.0)) == ("x", "y"), "the likelihood contradicts, unless hardly any is left"
+
+
 def test_what_stands_alone_is_not_fitted_again() -> None:
     tables = Held({"b": 0.0, "bx": 10.0})
     assert standing(proven(tables, "x")) == "x"
