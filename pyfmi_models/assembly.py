@@ -196,8 +196,8 @@ class Assembly:
     def _balanced(self, motion: Motion, push: Scalar, taken: Scalar, states: Mapping[str, Any]) -> Motion:
         if not any(effect.feels_inertia for _, effect in self.of_kind(FrictionEffect)):
             return motion
-        beside = self.viscous(motion, states) + self.loads(motion, states) - self.payload(motion, states)
-        return motion._replace(balance=Balance(push, taken, beside))
+        others = self.viscous(motion, states) + self.loads(motion, states) - self.payload(motion, states)
+        return motion._replace(balance=Balance(push, taken, others))
 
     def viscous(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Viscous torque [N m] after all friction effects."""

@@ -226,8 +226,8 @@ def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldo
     possible = None if whole is answer.chosen else heldout_rms(heldout, whole.mount, band)
     tested = global_test(answer.comparison, examined.base)
     held = replace(held, unvetoed_rms=unvetoed, possible_rms=possible, confidence_interval=interval)
-    told = (*described.data_quality, *examined.ended)
-    return replace(described, global_test=tested, heldout=held, data_quality=told)
+    notes = (*described.data_quality, *examined.ended)
+    return replace(described, global_test=tested, heldout=held, data_quality=notes)
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:

@@ -36,12 +36,12 @@ class Balance(NamedTuple):
     """Torques of a moment [N m], the friction level not known yet: what accelerates the axis is push - taken level.
 
     A recording tells that, so `taken` is 0 there; under a torque a sliding contact takes the level, with the sign of
-    the speed. `beside` is all else that resists but the weights, of which `payload` tells.
+    the speed. `others` is all else that resists but the weights, of which `payload` tells.
     """
 
     push: Scalar = 0.0
     taken: Scalar = 0.0
-    beside: Scalar = 0.0
+    others: Scalar = 0.0
 
 
 class Motion(NamedTuple):

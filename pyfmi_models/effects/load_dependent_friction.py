@@ -98,9 +98,9 @@ class GearLoadFriction(LoadScaledFriction):
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """The equations above."""
-        push, taken, beside = motion.balance
+        push, taken, others = motion.balance
         taking = self.friction_share * ca.sign(motion.v) - self.inertia_share * taken
-        given = motion.payload + self.inertia_share * push + self.friction_share * beside + taking * level
+        given = motion.payload + self.inertia_share * push + self.friction_share * others + taking * level
         rise = self.coulomb_per_Nm * level / self.at_level
         return level + rise * ca.fabs(given) / ca.fmax(1 - rise * taking * ca.sign(given), LEAST_LEFT)
 

@@ -80,9 +80,9 @@ def gear(e: Any, m: Motion, level: float) -> float:
 
 
 def through(e: Any, m: Motion, level: float) -> float:
-    """The root of g = level (1 + c/Fc |payload + s push + f beside + taking g|), halved to from both sides."""
+    """The root of g = level (1 + c/Fc |payload + s push + f others + taking g|), halved to from both sides."""
     taking = e.friction_share * sign(m.v) - e.inertia_share * m.balance.taken
-    given = m.payload + e.inertia_share * m.balance.push + e.friction_share * m.balance.beside
+    given = m.payload + e.inertia_share * m.balance.push + e.friction_share * m.balance.others
     low, high = level, 100 * (abs(level) + abs(given))
     for _ in range(200):
         middle = (low + high) / 2
