@@ -116,7 +116,9 @@ class Inverse:
         if acts.all():
             piece.lowpass_in_place(signals)
         else:
-            signals[acts] = piece.lowpass(signals[acts].T).T
+            some = signals[acts]
+            piece.lowpass_in_place(some)
+            signals[acts] = some
         return signals.T
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
@@ -360,6 +362,8 @@ def _each(added: Callable[[Array], Array]) -> Callable[[Sequence[Array]], Array]
 
 def stacked(inverse: Inverse, pieces: Sequence[Piece], values: Array) -> tuple[Array, Array]:
     """Return torque and derivatives at the kept rows of all pieces; each derivative lies in one stretch of memory."""
-    whole = [np.take(inverse.columns(piece, values).T, piece.kept, axis=1) for piece in pieces]
-    columns = np.concatenate(whole, axis=1) if len(whole) > 1 else whole[0]
+    ends = np.cumsum([0, *(len(piece.kept) for piece in pieces)])
+    columns = np.empty((1 + len(inverse.by), ends[-1]))
+    for piece, first, last in zip(pieces, ends, ends[1:], strict=False):
+        columns[:, first:last] = np.take(inverse.columns(piece, values).T, piece.kept, axis=1)
     return columns[0], columns[1:].T

@@ -12,6 +12,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+import numpy.typing as npt
 
 from cosim.estimation.kernels import done, library
 from cosim.estimation.prepare import Array, Piece, Prepared
@@ -21,6 +22,7 @@ from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
 
+Columns = npt.NDArray[np.floating[Any]]
 SEARCHED = 150.0
 """Rows a second that tell where in a grid the play is."""
 
@@ -70,9 +72,9 @@ def _searched(piece: Piece, plays: Sequence[Backlash]) -> Array:
 
 
 @kept_with(most=2)
-def torques_of_grid(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Array:
-    """The same for a grid that is looked at again: the last two are kept."""
-    return far_torques(prepared, plays, ratio)
+def torques_of_grid(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Columns:
+    """The same for a grid that is looked at again: the last two are kept, in half of their memory."""
+    return far_torques(prepared, plays, ratio).astype(np.float32)
 
 
 @cache

@@ -12,9 +12,9 @@ wind           gusts: noise that is the weaker the faster, correlated over .2 to
 """
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
-from scipy.signal import butter, sosfilt
 
 from cosim.support.statistics import rms
 from cosim_studies.proof.families import Family, add_push, angle, goal
@@ -23,6 +23,8 @@ from cosim_studies.proof.truth import TICK, Array
 
 Gate = Callable[[Array], Array]
 """How strong something is at each time, 0 to 1."""
+Band = tuple[float | tuple[float, float], Literal["bandpass", "lowpass"]]
+"""Edges of a filter [Hz], and what it passes."""
 
 
 def run_in(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
@@ -75,10 +77,9 @@ def payload_comes(bench: SimulatedAxis, rng: np.random.Generator, size: float) -
 def ground(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Bursts of a trembling floor: a torque through the unbalance of whatever the axis carries."""
     low = float(rng.uniform(2, 4))
-    filtered = butter(2, (low, low * float(rng.uniform(1.5, 2.5))), "bandpass", fs=1 / TICK, output="sos")
+    high = low * float(rng.uniform(1.5, 2.5))
     strength = 2.5 * goal(bench, rng, size)
-
-    _shake(bench, rng, strength, filtered, lambda t: _gates(rng, t))
+    _shake(bench, rng, strength, ((low, high), "bandpass"), lambda t: _gates(rng, t))
     return {"torque_rms": strength, "from_hz": low}
 
 
@@ -87,7 +88,7 @@ def vibration(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Pa
     low = float(rng.uniform(2, 4))
     high = low * float(rng.uniform(1.5, 2.5))
     strength = 1.5 * goal(bench, rng, size)
-    _shake(bench, rng, strength, butter(2, (low, high), "bandpass", fs=1 / TICK, output="sos"))
+    _shake(bench, rng, strength, ((low, high), "bandpass"))
     return {"torque_rms": strength, "from_hz": low, "to_hz": high}
 
 
@@ -95,7 +96,7 @@ def wind(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Paramet
     """Gusts on whatever the axis carries: noise behind a lag of second order."""
     correlation = float(rng.uniform(0.2, 1.0))
     strength = 1.5 * goal(bench, rng, size)
-    _shake(bench, rng, strength, butter(2, 1 / (2 * np.pi * correlation), "lowpass", fs=1 / TICK, output="sos"))
+    _shake(bench, rng, strength, (1 / (2 * np.pi * correlation), "lowpass"))
     return {"torque_rms": strength, "correlation_s": correlation}
 
 
@@ -103,8 +104,12 @@ def _always(t: Array) -> Array:
     return np.ones_like(t)
 
 
-def _shake(bench: SimulatedAxis, rng: np.random.Generator, strength: float, shape: Array, gate: Gate = _always) -> None:
+def _shake(bench: SimulatedAxis, rng: np.random.Generator, strength: float, band: Band, gate: Gate = _always) -> None:
     """Add filtered noise to each recording, of the strength where the gate is 1."""
+    from scipy.signal import butter, sosfilt  # nearly a second that machines on a quiet floor do not need
+
+    edges, kind = band
+    shape = butter(2, edges, kind, fs=1 / TICK, output="sos")
 
     def push(_: str, t: Array) -> Array:
         noise = np.asarray(sosfilt(shape, rng.standard_normal(t.size)))

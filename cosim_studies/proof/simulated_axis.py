@@ -5,9 +5,9 @@ All draws come from named streams of one seed, so that a case with an effect and
 
 import zlib
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
-from scipy.signal import lfilter
 
 from cosim.support.plain import Parsed
 from cosim.support.statistics import rms
@@ -136,7 +136,7 @@ def drift(rng: np.random.Generator, n: int, rms: float, correlation_s: float) ->
     keep = float(np.exp(-TICK / correlation_s))
     kicks = rng.standard_normal(n) * rms * np.sqrt(1 - keep**2)
     kicks[:1] = rng.standard_normal() * rms
-    return np.asarray(lfilter([1.0], [1.0, -keep], kicks))
+    return np.fromiter(accumulate(kicks.tolist(), lambda before, kick: kick + keep * before), float, n)
 
 
 def draw_drive(rng: np.random.Generator, motion: Motion, noise: dict[str, float]) -> Drive:

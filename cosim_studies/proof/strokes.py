@@ -7,7 +7,6 @@ before the start. Every motion starts at rest at `home`.
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy.signal import fftconvolve
 
 from cosim.support.statistics import hann
 from cosim_studies.proof.motion import Motion, Pace, placed, product
@@ -31,6 +30,8 @@ def _ridden(pace: Pace, legs: Iterator[Leg], ramp: float) -> Motion:
 
 def _smoothed(x: Array, seconds: float) -> Array:
     """`x` behind a Hann window of so many seconds."""
+    from scipy.signal import fftconvolve  # nearly a second that telescopes do not need
+
     window = hann(max(3, round(seconds / TICK)) + 2)
     return np.asarray(fftconvolve(x, window / window.sum())[: x.size])
 

@@ -13,7 +13,7 @@ from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, of_both_ways, span_of
 from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted
 from cosim.estimation.fit import Fit, with_values
-from cosim.estimation.play import far_torques, torques_of_grid
+from cosim.estimation.play import Columns, far_torques, torques_of_grid
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import least_way
@@ -195,7 +195,7 @@ def _grid(gaps: Array, slowings: Array) -> tuple[tuple[float, float], ...]:
 
 def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) -> tuple[float, float, float]:
     """Gap, deceleration, viscous over dry friction of the play that looks most like the residual, on finer grids."""
-    look: Callable[..., Array] = torques_of_grid
+    look: Callable[..., Columns] = torques_of_grid
     for window in WINDOWS:
         grid = _grid(gaps, slowings)
         alike = {ratio: _alike(look(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)}
@@ -212,7 +212,7 @@ def _around(values: Array, middle: float) -> Array:
     return np.geomspace(middle / step, middle * step, 7)
 
 
-def _alike(columns: Array, span: Span, window: float = 0.0) -> Array:
+def _alike(columns: Columns, span: Span, window: float = 0.0) -> Array:
     """Share of the residual that each column explains beyond what inertia and friction may, averaged over a window."""
     from scipy.ndimage import uniform_filter1d  # a tenth of a second that nothing before the search needs
 
