@@ -24,6 +24,10 @@ UNUSED_DAYS = 30
 """Tapes of other sources are removed once nobody has asked for them for so long."""
 
 
+MOST = 50_000
+"""Tapes of these sources that are kept, some 250 MB; with more of them the folder begins anew. A diagnosis has 300."""
+
+
 def stored(structure: object, parts: Sequence[type], make: Callable[[], Tapes]) -> Tapes:
     """What `make` makes of a structure, whose repr tells it from all others; from the disk where it is there.
 
@@ -47,13 +51,15 @@ def stored(structure: object, parts: Sequence[type], make: Callable[[], Tapes]) 
 
 @cache
 def _folder() -> Path:
-    """Folder of the tapes of these sources; it is made, and what has not been used for long is removed."""
+    """Folder of the tapes of these sources; it is made. Too many, and others not used for long, are removed."""
     physics, here = Path(pyfmi_models.__file__).parent, Path(__file__).parent
     digest = hashlib.blake2b(ca.CasadiMeta.version().encode(), digest_size=8)
     for path in chain(*(sorted(physics.glob(pattern)) for pattern in PHYSICS), (here / name for name in OURS)):
         digest.update(path.read_bytes())
     folder = cache_home() / "tapes" / digest.hexdigest()
     try:
+        if folder.is_dir() and sum(1 for _ in os.scandir(folder)) > MOST:
+            shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "used").touch()
         for other in folder.parent.iterdir():

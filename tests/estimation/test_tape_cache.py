@@ -54,6 +54,17 @@ def test_a_damaged_file_is_made_again(folder: Path, damage: bytes) -> None:
     assert all(path.read_bytes() != damage for path in folder.rglob("*.tape"))
 
 
+def test_a_folder_with_too_many_begins_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = evaluated()
+    old = sorted(folder.rglob("*.tape"))
+    for path in old:
+        path.rename(path.with_stem(f"another {path.stem}"))
+    tape_cache._folder.cache_clear()
+    monkeypatch.setattr(tape_cache, "MOST", 1)
+    assert all(np.array_equal(*both) for both in zip(first, evaluated(), strict=True))
+    assert sorted(folder.rglob("*.tape")) == old
+
+
 def test_a_folder_that_cannot_be_made_is_done_without(folder: Path) -> None:
     folder.write_text("a file is in its place", "utf-8")
     assert np.isfinite(evaluated()[0]).all()
