@@ -211,9 +211,6 @@ def test_prose_shows_symbols_as_formulas_do_and_leaves_names_and_words():
     )
 
 
-LICENCES = ("license", "fmi-headers")
-
-
 def test_licences_of_all_that_is_inside_are_inside(archive):
     with zipfile.ZipFile(archive(models.lugre, 3)) as file:
         ours, headers = (

@@ -3,7 +3,6 @@
 import ctypes
 from math import inf, nan
 
-import casadi as ca
 import export_models as models
 import numpy as np
 import pytest
@@ -188,33 +187,6 @@ def test_a_tighter_tolerance_gives_a_smaller_error(fmi):
     errors = [np.abs(end(tolerance) / exact - 1).max() for tolerance in (1e-3, 1e-5, 1e-7, 1e-9)]
     assert errors[0] > 10 * errors[1] > 100 * errors[2] > 1000 * errors[3]
     assert errors[2] < 1e-6
-
-
-def directional(driver, unknowns, knowns, seed):
-    arrays = [(ctypes.c_uint * len(names))(*(driver.references[n] for n in names)) for names in (unknowns, knowns)]
-    seeds, result = (ctypes.c_double * len(knowns))(*seed), (ctypes.c_double * len(unknowns))()
-    sizes = [ctypes.c_size_t(len(names)) for names in (unknowns, knowns)]
-    arguments = (arrays[0], sizes[0], arrays[1], sizes[1], seeds)
-    tail = (result,) if driver.fmi == 2 else (sizes[1], result, sizes[0])
-    return driver.call("GetDirectionalDerivative", *arguments, *tail), np.array(result)
-
-
-def test_directional_derivatives_are_those_of_the_equations(fmi):
-    model = models.lugre()
-    driver = instance(models.lugre, fmi, drive=5.0, speed=0.01).run(0, 10, 1e-3)
-    unknowns = ["der(angle)", "der(speed)", "der(z)", "reading", "torque"]
-    knowns = ["speed", "z", "drive", "friction.Vs"]
-    arguments = models.symbols(3, 1, 7)
-    slopes = ca.jacobian(ca.vertcat(*model.equations(*arguments)), ca.vertcat(*arguments))
-    point = [0, driver.get("angle", "speed", "z"), 5.0, [p.start for p in model.parameters]]
-    jacobian = np.array(ca.Function("slopes", arguments, [slopes])(*point))[:, [2, 3, 4, 11]]
-    seed = [1e-2, 1e-5, 1.0, -2.0]
-    status, found = directional(driver, unknowns, knowns, seed)
-    assert status == "ok"
-    assert found == pytest.approx(jacobian @ seed, rel=1e-13)
-    assert directional(driver, ["angle"], ["drive"], [1.0])[0] == "error"
-    assert directional(driver, ["torque"], ["reading"], [1.0])[0] == "error"
-    assert directional(instance(models.controller, fmi), ["command"], ["wanted"], [1.0])[0] == "error"
 
 
 def test_log_categories_can_be_chosen(fmi):

@@ -54,16 +54,6 @@ def test_a_state_serialized_in_one_version_of_fmi_goes_on_in_the_other():
     assert everything(three.run(0.1, 50, 1e-3)) == everything(two.run(0.1, 50, 1e-3))
 
 
-@both
-def test_an_instance_goes_on_from_a_state_of_another_however_far_it_went_itself(fmi):
-    first, second = instance(models.lugre, fmi, drive=5.0), instance(models.lugre, fmi, drive=-3.0)
-    first.run(0, 20, 1e-3)
-    state = first.save()
-    second.run(0, 333, 3e-4)
-    assert second.restore(state) == "ok"
-    assert everything(second.run(0.02, 20, 1e-3)) == everything(first.run(0.02, 20, 1e-3))
-
-
 def test_instances_in_threads_give_the_bits_that_they_give_alone():
     """Eight at once, plants and controllers, FMI 2 and 3; Python lets go of its lock inside each call."""
 

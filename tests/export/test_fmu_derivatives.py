@@ -167,14 +167,15 @@ def test_a_subset_in_any_order_gives_the_same_entries():
     assert list(part) == [whole[4], whole[0], whole[2]]
 
 
-def test_adjoint_derivatives_refuse_what_directional_ones_refuse():
-    driver = initializing(models.lugre, 3)
-    assert ask(driver, "Adjoint", ["drive"], ["speed"], [1.0])[0] == "error"
+@pytest.mark.parametrize(("which", "fmi"), [("Directional", 2), ("Directional", 3), ("Adjoint", 3)])
+def test_a_derivative_is_of_what_is_calculated_by_what_is_not(which, fmi):
+    driver = initializing(models.lugre, fmi)
+    assert ask(driver, which, ["drive"], ["speed"], [1.0])[0] == "error"
     assert driver.messages[-1][2] == '"drive" is not calculated: it has no derivative'
-    assert ask(driver, "Adjoint", ["torque"], ["reading"], [1.0])[0] == "error"
+    assert ask(driver, which, ["torque"], ["reading"], [1.0])[0] == "error"
     assert driver.messages[-1][2] == '"reading" is calculated: no derivative with respect to it'
-    controller = models.Driver(models.controller(), library(models.controller), 3).start()
-    assert ask(controller, "Adjoint", ["command"], ["wanted"], [1.0])[0] == "error"
+    controller = models.Driver(models.controller(), library(models.controller), fmi).start()
+    assert ask(controller, which, ["command"], ["wanted"], [1.0])[0] == "error"
     assert "a sampled model has no partial derivatives" in controller.messages[-1][2]
 
 

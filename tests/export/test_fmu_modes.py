@@ -131,33 +131,20 @@ def test_a_seed_that_is_not_finite_is_refused_by_name(fmi):
     assert driver.messages[-1][2] == 'the seed nan of "speed" is not finite'
 
 
-def test_an_importer_that_asks_for_event_mode_in_co_simulation_gets_a_sentence():
-    said, logger = [], models.LOGGER3(lambda e, status, category, message: said.append(message.decode()))
-    create = ctypes.CDLL(str(library(models.lugre))).fmi3InstantiateCoSimulation
+@pytest.mark.parametrize(
+    ("kind", "arguments", "said"),
+    [
+        ("CoSimulation", (True, False, None, ctypes.c_size_t(0), None), "event mode is not available in co-simulation"),
+        ("ScheduledExecution", (None,), "the model has no scheduled execution"),
+    ],
+)
+def test_what_a_model_does_not_offer_is_refused_with_a_sentence(kind, arguments, said):
+    heard, logger = [], models.LOGGER3(lambda e, status, category, message: heard.append(message.decode()))
+    create = getattr(ctypes.CDLL(str(library(models.lugre))), f"fmi3Instantiate{kind}")
     create.restype = ctypes.c_void_p
     token = models.generate(models.lugre()).token.encode()
-    none = (None, ctypes.c_size_t(0), None)
-    assert create(b"it", token, None, False, False, True, False, *none, logger, None) is None
-    assert said == ["event mode is not available in co-simulation"]
-
-
-def test_scheduled_execution_is_refused_with_a_sentence():
-    said, logger = [], models.LOGGER3(lambda e, status, category, message: said.append(message.decode()))
-    create = ctypes.CDLL(str(library(models.lugre))).fmi3InstantiateScheduledExecution
-    create.restype = ctypes.c_void_p
-    token = models.generate(models.lugre()).token.encode()
-    assert create(b"it", token, None, False, False, None, logger, None, None, None) is None
-    assert said == ["the model has no scheduled execution"]
-
-
-@both
-def test_nothing_is_read_from_the_folder_of_resources(fmi, monkeypatch):
-    """There is none to miss: the same bits with a folder that does not exist, and without one."""
-    found = []
-    for folder in (b"file:///there/is/nothing", None):
-        monkeypatch.setattr(models, "RESOURCES", folder)
-        found.append(everything(instance(models.lugre, fmi, drive=5.0).run(0, 20, 1e-3)))
-    assert found[0] == found[1]
+    assert create(b"it", token, None, False, False, *arguments, logger, None, None, None) is None
+    assert heard == [said]
 
 
 @both

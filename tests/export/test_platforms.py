@@ -140,11 +140,6 @@ def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
             assert elf_machine(archive.read("binaries/linux64/emps_plant.so")) == machine
 
 
-def test_an_unknown_platform_leaves_nothing_behind(tmp_path):
-    assert call("export", "emps", "--platform", "vax", "--out", tmp_path / "out") == 2
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_platforms_are_named_in_words_and_the_host_comes_first():
     assert platforms_of("host") == (host(),)
     assert set(platforms_of("all")) == set(PLATFORMS)

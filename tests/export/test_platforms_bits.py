@@ -137,12 +137,6 @@ def test_another_compiler_computes_the_same_bits(make, tmp_path):
     assert gcc_bits(make, tmp_path, "-O3", "-ffp-contract=off") == native(make)
 
 
-def test_the_hash_notices_a_multiplication_and_addition_in_one_rounding(tmp_path):
-    if "fma" not in Path("/proc/cpuinfo").read_text().split():
-        pytest.skip("this processor has no fused multiply-add")
-    assert gcc_bits(plant, tmp_path, "-O2", "-mfma", "-ffp-contract=fast") != native(plant)
-
-
 LOADERS = {
     "x86_64-windows": b"""
 __declspec(dllimport) void *LoadLibraryA(const char *name);

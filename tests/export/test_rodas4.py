@@ -4,7 +4,6 @@ from ctypes import CDLL, CFUNCTYPE, POINTER, Structure, byref, c_double, c_int, 
 from pathlib import Path
 
 import casadi as ca
-import export_models as models
 import fmpy
 import numpy as np
 import pytest
@@ -79,15 +78,6 @@ def test_a_step_that_meets_a_growing_mode_shows_a_small_pivot():
     step = solver((1, 0, 0), lambda t, x, u, p: [x])
     assert abs(step(0.0, 1.0, h=4.0 * (1 + 1e-12))[2][0]) > 1e9
     assert step(0.0, 1.0, h=0.04)[2][0] == pytest.approx(0.01 / 0.99)
-
-
-def test_divisions_by_parameters_are_done_once_a_step():
-    model = models.lugre()
-    point = models.symbols(3, 1, 7)
-    rates = ca.Function("rates", point, [ca.densify(model.equations(*point)[0])])
-    stages = step_functions(rates, [1.0] * 3)[-1]
-    divisions = [k for k in range(stages.n_instructions()) if stages.instruction_id(k) in (ca.OP_DIV, ca.OP_INV)]
-    assert len(divisions) == 5 + 3  # one by the friction level in each later stage, one for each state's error
 
 
 RATES, JACOBIAN = (CFUNCTYPE(c_int, c_void_p, c_double, *count * [POINTER(c_double)]) for count in (2, 3))

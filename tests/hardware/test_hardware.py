@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario, session, simulated
+from on_hardware import SCENARIO, invoke, recorded, scenario, session, simulated
 
 from cosim.data.recording import Recording
-from cosim.hardware.machine import changed, parse_machine
+from cosim.hardware.machine import parse_machine
 from cosim.hardware.replay import replay
-from cosim.hardware.session import Session, run_session
+from cosim.hardware.session import run_session
 from cosim.hardware.words import LIMITS
 from cosim.master.simulate import Options, run
 from cosim.support.errors import HardwareError
@@ -153,12 +153,3 @@ def test_the_command_runs_replays_and_says_no(tmp_path: Path) -> None:
     looked = invoke("check", str(path), "--seconds", "0.05")
     assert looked.exit_code == 0, looked.output
     assert "worst wake up us" in looked.output
-
-
-def test_a_supervisor_that_advances_gives_a_sign_of_life_as_often_as_one_cycle_asks(tmp_path: Path) -> None:
-    strict = changed(SIMULATED, "test", reactions=SIMULATED.reactions.model_dump() | {"heartbeat_ms": 0.1})
-    with Session(scenario(), strict, tmp_path / "box", fast=True) as one:
-        one.enable()
-        assert one.advance(50).running
-        one.run_alone(3)
-        assert "heartbeat_lost" in one.status.faults

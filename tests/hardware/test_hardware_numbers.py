@@ -20,7 +20,6 @@ from cosim.hardware.axis import cycles_of
 from cosim.hardware.loops import period_of
 from cosim.hardware.machine import Inject, changed
 from cosim.hardware.move import Move, _inertia, _set_points
-from cosim.hardware.session import Session
 from cosim.hardware.simulated import _injection
 from cosim.hardware.udp import UdpDrive, Welcome, key_of
 from cosim.hardware.wired import _check_controller
@@ -45,37 +44,31 @@ def enums(*files: str) -> dict[str, int]:
     return found
 
 
-def test_sizes_and_words_are_those_of_the_headers() -> None:
-    c = enums("hardware.h")
-    for name in ("INPUTS", "MISSES", "HEADS", "LIMITS"):
-        assert getattr(structures, name) == c[name]
-    for name in ("ASK_ENABLE", "ASK_QUICK_STOP", "ASK_ESTOP", "ASK_RESET", "ENTERED", "STEPPED", "LIMITED", "SLEWED"):
-        assert getattr(words, name) == c[name]
-    for name in ("READ_OK", "READ_STALE", "READ_ERROR"):
-        assert getattr(python_adapter, name) == c[name]
+@pytest.mark.parametrize(
+    ("header", "module", "names"),
+    [
+        ("hardware.h", structures, "INPUTS MISSES HEADS LIMITS"),
+        ("hardware.h", words, "ASK_ENABLE ASK_QUICK_STOP ASK_ESTOP ASK_RESET ENTERED STEPPED LIMITED SLEWED FAULT"),
+        ("hardware.h", python_adapter, "READ_OK READ_STALE READ_ERROR"),
+        ("udp.h", structures, "NONCE TAG KEY"),
+        ("udp.h", udp, "MAGIC HELLO WELCOME BUSY DENIED"),
+    ],
+)
+def test_numbers_that_both_sides_write_are_those_of_the_headers(header: str, module: Any, names: str) -> None:
+    c = enums(header)
+    assert {name: getattr(module, name) for name in names.split()} == {name: c[name] for name in names.split()}
+
+
+def test_words_stand_in_the_order_of_the_headers() -> None:
+    c = enums("hardware.h", "drive.h")
     assert (c["OPERATION_ENABLED"], c["QUICK_STOP_ACTIVE"]) == (words.ENABLED, words.QUICK_STOP_STATE)
-    assert words.FAULT == c["FAULT"] == len(words.STATES) - 1
-    assert [c[name.upper()] for name in words.FAULTS] == list(range(len(words.FAULTS)))
+    assert len(words.STATES) - 1 == words.FAULT
     assert [c[f"HEAD_{name.upper()}"] for name in words.REASONS[1:]] == [1, 2, 3]
-
-
-def test_frames_are_those_of_the_header() -> None:
-    c = enums("udp.h")
-    for name in ("NONCE", "TAG", "KEY"):
-        assert getattr(structures, name) == c[name]
-    for name in ("MAGIC", "HELLO", "WELCOME", "BUSY", "DENIED"):
-        assert getattr(udp, name) == c[name]
-    assert udp.FRAME.size == 16 + 8 + 16 + 8 + c["NONCE"] + c["TAG"] + 4
-    assert udp.FRAME.size - c["TAG"] - 4 == udp.TAGGED
-
-
-def test_injections_stand_in_the_order_of_the_header() -> None:
-    c = enums("drive.h")
-    assert [c[name.upper()] for name in words.INJECTIONS] == list(range(len(words.INJECTIONS)))
-    assert [words.INJECTIONS[c[name.upper()]] for name in (*words.OF_FRAMES, *words.OF_HEADS)] == [
-        *words.OF_FRAMES,
-        *words.OF_HEADS,
-    ]
+    for counted in (words.FAULTS, words.INJECTIONS):
+        assert [c[name.upper()] for name in counted] == list(range(len(counted)))
+    assert {*words.OF_FRAMES, *words.OF_HEADS} <= {*words.INJECTIONS}
+    sizes = enums("udp.h")
+    assert udp.FRAME.size == 16 + 8 + 16 + 8 + sizes["NONCE"] + sizes["TAG"] + 4 == udp.TAGGED + sizes["TAG"] + 4
 
 
 @pytest.mark.parametrize("bits", [0, 1, 0b1010_0000_0000_0001, 0xFFFF])
@@ -123,12 +116,6 @@ def test_an_axis_and_its_session_have_the_numbers_of_their_files(tmp_path: Path)
         told = one.statistics
         assert (told["cycles"], told["late_cycles"], told["worst_wake_up_us"]) == (5, 5, 4.5)
         assert (told["real_time"], told["heads_left_out"]) == (False, {})
-
-
-def test_a_black_box_is_as_long_as_its_file_says_where_the_session_is_longer(tmp_path: Path) -> None:
-    short = changed(SIMULATED, "test", black_box_seconds=0.05)
-    with session(tmp_path, short) as one:
-        assert one._box.box.capacity == 500
 
 
 def test_a_fault_of_a_drive_begins_and_ends_at_its_cycles() -> None:
@@ -275,28 +262,11 @@ def test_a_move_is_a_sine_that_starts_at_rest_where_the_axis_is() -> None:
     assert np.ptp(q) == pytest.approx(2e-3)
 
 
-class Silent:
-    """A loop that is alive, and of which nothing moves."""
-
-    def __init__(self, axis: Any) -> None:
-        self.axis, self._session = axis, SimpleNamespace(tick=90, setpoints=4000)
-
-
-def test_what_is_over_of_the_set_points_counts_from_the_entry_into_operation() -> None:
-    axis = structures.CAxis(entered=40, running=1)
-    assert Session._done(Silent(axis)) == 50  # type: ignore[arg-type]
-    axis.running = 0
-    assert Session._done(Silent(axis)) == 0  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("step", [1e300, 11.0, 1e-9, float("nan"), float("inf")])
-def test_a_step_of_no_clock_is_refused(step: float) -> None:
-    with pytest.raises(HardwareError, match=r"has cycles of 1e-06 s to 10 s"):
-        period_of(step)
-
-
-def test_a_cycle_is_counted_in_nanoseconds() -> None:
+def test_a_cycle_is_counted_in_nanoseconds_and_one_of_no_clock_is_refused() -> None:
     assert [period_of(step) for step in (1e-6, 1e-4, 10.0)] == [1_000, 100_000, 10_000_000_000]
+    for step in (1e300, 11.0, 1e-9, float("nan"), float("inf")):
+        with pytest.raises(HardwareError, match=r"has cycles of 1e-06 s to 10 s"):
+            period_of(step)
 
 
 @pytest.mark.parametrize(("option", "value"), [("--step", "1e300"), ("--counts-per-turn", "1e-320")])

@@ -97,12 +97,6 @@ def test_what_is_cut_off_is_seen(whole: Recording) -> None:
     assert not done.identical
 
 
-def test_a_hole_is_seen(whole: Recording) -> None:
-    kept = np.delete(np.arange(len(whole)), np.arange(300, 310))
-    with pytest.raises(HardwareError, match="was altered: cycle 310 follows cycle 299"):
-        replay(replace(whole, table={name: column[kept] for name, column in whole.table.items()}))
-
-
 def test_the_seal_is_checked(whole: Recording) -> None:
     assert broken_seal(whole) == ""
     other = seal_of(whole.table | {"extra": np.zeros(len(whole))}, whole.origin["hardware"])
@@ -229,13 +223,6 @@ def test_the_command_finds_the_controller_by_the_card(tmp_path: Path, monkeypatc
     assert other.exit_code == 2
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
     assert invoke("replay", str(recording)).exit_code == 2
-
-
-def test_the_command_says_what_was_cut_off(whole: Recording, tmp_path: Path) -> None:
-    cut = replace(whole, table={name: column[:500] for name, column in whole.table.items()})
-    done = invoke("replay", str(cut.write(tmp_path / "cut.parquet")))
-    assert done.exit_code == 1
-    assert f"is not the file that was written: it has 500 of the {len(whole):,} cycles" in done.output
 
 
 @pytest.mark.parametrize(

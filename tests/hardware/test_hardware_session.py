@@ -10,18 +10,21 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 from on_hardware import SIMULATED
-from over_udp import BYE, SESSION, drive, frame, over, session, talking
+from over_udp import BYE, SESSION, WORDS, Loop, drive, frame, over, session, talking
 
 from cosim.hardware.library import library
 from cosim.hardware.machine import Machine, changed
 from cosim.hardware.session import run_session
 from cosim.hardware.udp import BUSY, DENIED, HELLO, MAGIC, WELCOME, closed, key_of, sealed
+from cosim.hardware.virtual import VirtualDrive
 from cosim.support.errors import HardwareError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
@@ -212,3 +215,44 @@ def test_ctrl_c_ends_a_drive_whose_plant_does_not_return() -> None:
         _, errors = process.communicate(timeout=60)
     assert b"does not end its step" in errors
     assert process.returncode != 0
+
+
+# In real time a virtual drive obeys orders of now only: one that is older than its watchdog moves nothing.
+
+NOW = 1_000_000
+"""Tick of the first order."""
+
+
+@contextmanager
+def from_now_on(watchdog_ms: float) -> Iterator[tuple[VirtualDrive, Loop]]:
+    """A drive in operation whose orders began at a late tick."""
+    given = changed(SIMULATED, "test", watchdog_ms=watchdog_ms)
+    with drive(given, lockstep=False) as there, talking(there) as loop:
+        for sequence, word in enumerate(WORDS, 1):
+            loop.obeyed(sequence, word, tick=NOW)
+        yield there, loop
+
+
+@pytest.mark.parametrize(("behind", "obeyed"), [(0, True), (40_000, True), (50_001, False), (500_001, False)])
+def test_an_order_older_than_the_watchdog_of_50_000_ticks_moves_nothing_and_is_counted(
+    behind: int, obeyed: bool
+) -> None:
+    with from_now_on(5000.0) as (there, loop):
+        loop.send(loop.order(5, 15, 1.0, NOW - behind))
+        assert loop.silent() != obeyed
+        assert there.drive.held == (1.0 if obeyed else 0.0)
+        assert there.statistics["orders"]["late"] == (0 if obeyed else 1)
+        assert loop.obeyed(6, 15, 2.0, tick=NOW) == 2.0
+
+
+def test_orders_that_are_too_old_do_not_keep_the_watchdog_quiet() -> None:
+    with from_now_on(200.0) as (there, loop):
+        assert loop.obeyed(5, 15, 1.0, tick=NOW) == 1.0
+        sequence, last = 6, time.monotonic() + 5
+        while there.drive.held != 0:
+            assert time.monotonic() < last, "the torque stays"
+            loop.send(loop.order(sequence, 15, 1.0, NOW - 10 * 2_000))
+            sequence += 1
+            time.sleep(0.01)
+        assert there.statistics["watchdog_trips"] == 1
+        assert there.drive.state == 7
