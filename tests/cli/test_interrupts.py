@@ -4,6 +4,7 @@ import errno
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -15,21 +16,30 @@ from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
 
 
+@pytest.fixture
+def handlers() -> Iterator[Callable[[], None]]:
+    """Take the handlers of a fresh process, as often as it is called; afterwards all is as it was."""
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+
+    def fresh() -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    yield fresh
+    for one, handler in before.items():
+        signal.signal(one, handler)
+    end_well()
+
+
 def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], handlers: Callable[[], None]
 ) -> None:
     """Typer takes each KeyboardInterrupt for Ctrl-C."""
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-            come = partial(signal.raise_signal, number)
-            monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
-            assert call("show", "paper_mount") == code
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        come = partial(signal.raise_signal, number)
+        monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
+        handlers()
+        assert call("show", "paper_mount") == code
     assert "cosim: terminated" in capsys.readouterr().err
 
 
@@ -44,7 +54,9 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
         (OSError(errno.ENOSPC, "No space left on device"), signal.SIGTERM, 2),
     ],
 )
-@pytest.mark.usefixtures("capsys")  # not the descriptor of pytest's own file: a verb that fails lets go of its stdout
+@pytest.mark.usefixtures(
+    "handlers", "capsys"
+)  # not the descriptor of pytest's own file: a verb that fails lets go of its stdout
 def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
     error: Exception, number: int | None, code: int | None
 ) -> None:
@@ -60,15 +72,9 @@ def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
                 signal.raise_signal(number)
         raise error
 
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
-            guarded(verb, False)()
-        assert getattr(ended.value, "code", None) == code
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        end_well()
+    with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
+        guarded(verb, False)()
+    assert getattr(ended.value, "code", None) == code
 
 
 @pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])
@@ -83,7 +89,11 @@ def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseExcep
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
 def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
-    number: int | None, code: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    number: int | None,
+    code: int | None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    handlers: Callable[[], None],
 ) -> None:
     """A C extension that is interrupted as it is loaded raises an ImportError of its own."""
 
@@ -93,18 +103,11 @@ def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
                 signal.raise_signal(number)
         raise ImportError(f"initialization of {name} failed")
 
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     monkeypatch.setattr(sys.modules["cosim.cli.verbs"], "import_module", loaded)  # `cosim.cli.verbs` is the function
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        with pytest.raises(ImportError if code is None else SystemExit) as ended:
-            main(["export", "paper_mount", "--out", "out"])
-        assert getattr(ended.value, "code", None) == code
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        end_well()
+    handlers()
+    with pytest.raises(ImportError if code is None else SystemExit) as ended:
+        main(["export", "paper_mount", "--out", "out"])
+    assert getattr(ended.value, "code", None) == code
     said = {130: "cosim: interrupted\n", 143: "cosim: terminated\n", None: ""}
     assert capsys.readouterr().err == said[code]
 
@@ -149,32 +152,8 @@ def verb():
 end_well()
 guarded(verb, False)()
 """
-
-
-def ended(comes: str, seconds: float) -> tuple[int, str]:
-    """Run a verb in which something comes while an object is finalized."""
-    command = [sys.executable, "-c", FINALIZED.format(comes=comes, seconds=seconds)]
-    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
-    return done.returncode, done.stderr
-
-
-@pytest.mark.parametrize(
-    ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
-)
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_a_signal_that_comes_where_python_ignores_exceptions_is_not_lost(name: str, code: int, said: str) -> None:
-    assert ended(f"signal.raise_signal(signal.{name})", 600) == (code, said)
-
-
-def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:
-    code, said = ended("raise ValueError('of a finalizer')", 0)
-    assert code == 0
-    assert said.startswith("Exception ignored in: ")
-    assert said.endswith("ValueError: of a finalizer\n")
-
-
 ASKED = """
-import os, signal, time
+import signal, time
 import casadi as ca
 from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
@@ -186,7 +165,7 @@ class Shaped:
     def shape(self):
         self.asked += 1
         if self.asked == 1:
-            os.kill(os.getpid(), signal.{name})
+            {comes}
         return 1, 1
 
 def verb():
@@ -194,20 +173,33 @@ def verb():
         ca.fmax(ca.SX.sym("x"), Shaped())
     except NotImplementedError:
         pass  # it is no number
-    time.sleep(600)
+    time.sleep({seconds})
 
 end_well()
 guarded(verb, False)()
 """
 
 
+def ended(program: str, comes: str, seconds: float) -> tuple[int, str]:
+    """Run a verb in which something comes while an object is finalized, or while CasADi asks one for its shape."""
+    command = [sys.executable, "-c", program.format(comes=comes, seconds=seconds)]
+    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("program", [FINALIZED, ASKED], ids=["finalized", "casadi"])
 @pytest.mark.parametrize(
     ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_a_signal_that_comes_where_casadi_takes_errors_for_an_answer_is_not_lost(
-    name: str, code: int, said: str
+def test_a_signal_that_comes_where_errors_are_ignored_is_not_lost(
+    program: str, name: str, code: int, said: str
 ) -> None:
-    command = [sys.executable, "-c", ASKED.format(name=name)]
-    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
-    assert (done.returncode, done.stderr) == (code, said)
+    assert ended(program, f"signal.raise_signal(signal.{name})", 600) == (code, said)
+
+
+def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:
+    code, said = ended(FINALIZED, "raise ValueError('of a finalizer')", 0)
+    assert code == 0
+    assert said.startswith("Exception ignored in: ")
+    assert said.endswith("ValueError: of a finalizer\n")

@@ -10,13 +10,10 @@ from cosim.support.errors import InputError, OutputError
 from cosim.support.files import check_free
 
 
-def test_a_file_in_the_place_of_a_folder_is_told_before_the_work(tmp_path: Path) -> None:
+def test_what_is_no_folder_in_the_place_of_one_is_told_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file", "utf-8")
     with pytest.raises(OutputError, match=r"The directory .*taken cannot be made: .*taken is a file\."):
         check_free(tmp_path / "taken" / "card.toml", force=True)
-
-
-def test_a_folder_below_what_is_no_folder_is_refused_before_the_work() -> None:
     with pytest.raises(OutputError, match=r"The directory /dev/null/paper cannot be made: /dev/null is no folder\."):
         check_free(Path("/dev/null/paper/README.md"), force=True)
 

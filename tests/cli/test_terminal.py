@@ -3,16 +3,12 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from commands import call
 
 from cosim.cli import set_libraries
-from cosim.data.recording import Recording
-from cosim.estimation.identify.estimate import Estimate, Outputs, estimate
 from cosim.support.errors import InputError, UndecidedError
 from cosim.support.near import near as near_of_runner
 from cosim.support.terminal import stage
@@ -55,6 +51,8 @@ def test_a_verb_that_was_nearly_hit_is_suggested(
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
+        ("stpe = 0.001\nstop = 1.0\n", '"stpe" is no key of a scenario'),
+        ("stpe = 0.001\nstop = 1.0\n", 'Did you mean "step"?'),
         (CARD.replace("inertia", "inertai"), "[mount] inertai is not a key of a card; keys are: name, motion,"),
         (CARD.replace("inertia", "inertai"), 'torque_limit, machine. Did you mean "inertia"?'),
         (CARD + "[encoder]\ncounts = 3\n", 'Did you mean "counts_per_rev"?'),
@@ -64,21 +62,12 @@ def test_a_verb_that_was_nearly_hit_is_suggested(
         (CARD + '[[effects]]\neffect = "coging"\n', 'Did you mean "cogging"?'),
     ],
 )  # fmt: skip
-def test_a_misspelt_key_of_a_card_is_named_before_the_one_that_is_then_missing(
+def test_a_misspelt_key_is_named_before_the_one_that_is_then_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, sentence: str
 ) -> None:
     path = tmp_path / "axis.toml"
     path.write_text(text)
     assert sentence in said(capsys, "show", path)
-
-
-def test_a_misspelt_key_of_a_scenario_is_named_with_the_one_that_was_meant(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "loop.toml"
-    path.write_text("stpe = 0.001\nstop = 1.0\n")
-    assert '"stpe" is no key of a scenario' in (told := said(capsys, "run", path, "--out", tmp_path / "out"))
-    assert 'Did you mean "step"?' in told
 
 
 def test_a_suggestion_is_made_once_and_only_where_something_is_alike() -> None:
@@ -118,47 +107,6 @@ def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.Capt
         progress.tell("nothing of this")
         progress.log("friction map")
     assert capsys.readouterr().err.splitlines() == ["identifying", "friction map"]
-
-
-def undetermined(*names: str) -> Estimate:
-    """Of y = a exp(-t) + b exp(-1.0001 t) and noise, a and b are anything that has their sum."""
-    t = np.linspace(0, 3, 400)
-    columns = np.stack([np.exp(-t), np.exp(-1.0001 * t)], axis=1)
-    measured = columns @ [1.0, 2.0] + 0.01 * np.random.default_rng(1).normal(size=len(t))
-
-    def model(values: np.ndarray) -> Outputs:
-        return Outputs((measured - columns @ values)[:, None], columns[:, None, :])
-
-    return estimate(names, np.array([1.5, 1.5]), model)
-
-
-def test_a_number_that_is_not_determined_is_said_without_a_value() -> None:
-    found = undetermined("a", "b")
-    assert found.values.sum() == pytest.approx(3.0, abs=0.01)
-    assert "a is not determined here." in found.warnings
-
-
-def test_identify_says_what_it_does_and_what_it_could_not_determine_before_it_writes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from cosim.estimation.identify import identify as found_by
-
-    t = np.arange(4000) * 1e-3
-    Recording("run", {"t": t, "tau": np.cos(t), "q": np.sin(t), "q_d": np.sin(t)}).write(tmp_path / "run.csv")
-    (tmp_path / "axis.toml").write_text(CARD)
-    monkeypatch.setattr(found_by, "_map", lambda *_: None)
-    found = replace(undetermined("axis.inertia", "friction.Fc"), held={"friction.sigma2": 30.0})
-    monkeypatch.setattr(found_by, "_outputs", lambda *_: [found])
-    monkeypatch.setattr(found_by, "_with_estimate", lambda card, _: card)
-    monkeypatch.setattr("cosim.estimation.identify.figures.FIGURES", {})
-    out = tmp_path / "out"
-    assert call("identify", tmp_path / "run.csv", "--card", tmp_path / "axis.toml", "--out", out) == 0
-    lines = capsys.readouterr().err.splitlines()
-    stages = [line.split(":")[0] for line in lines]
-    for one, after in (("free", "friction map"), ("friction map", "presliding steps"), ("not determined", "drawing")):
-        assert stages.index(one) < stages.index(after)
-    (kept,) = [line for line in lines if line.startswith("not determined: ")]
-    assert kept.endswith("card.toml keeps the given card's.")
 
 
 @pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
