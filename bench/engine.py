@@ -37,7 +37,7 @@ COMPARED = ("demo", "home_one_9_delay", "emps", "home_several_0_cable_wrap_compl
 LENGTHS = (60.0, 120.0, 240.0)
 """Seconds of each of three recordings at 1 kHz, over which processor time shall grow with the rows."""
 WALKED = {"types": "<= 40", "files": "<= 90", "returns": "<= 150"}
-"""What a recording meets on its way through a diagnosis, as `tests/house/walk.py` counts, and what was asked."""
+"""What a recording meets on its way through a diagnosis, as `bench/walk.py` counts, and what was asked."""
 FIRST_FIT = """
 import runpy, sys, time
 from cosim.estimation.problem import Problem
@@ -124,7 +124,7 @@ def walked() -> Iterator[Row]:
     case = next(one for one in home() if one.name == "home_several_0_cable_wrap_compliance")
     with tempfile.TemporaryDirectory() as work:
         case.write(Path(work))
-        words = ["tests/house/walk.py", "diagnose", *case.arguments(Path(work)), "--out", f"{work}/out"]
+        words = ["bench/walk.py", "diagnose", *case.arguments(Path(work)), "--out", f"{work}/out"]
         counted = used(ROOT, words).words.replace(",", "").split()
     for what, asked in WALKED.items():
         yield Row(f"a recording on its way, --quick: {what}", asked, counted[counted.index(what) + 1])

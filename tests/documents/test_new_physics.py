@@ -52,15 +52,11 @@ def own_files() -> list[str]:
     return [block for block in blocks("python") if block.startswith(("# pyfmi_models/", "# cosim/"))]
 
 
-def run(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def run(folder: Path, *arguments: str, own: bool = True) -> str:
+    """What Python prints in a folder, with the packages of the folder or those that are installed."""
+    environment = os.environ | ({"PYTHONPATH": str(folder)} if own else {})
+    command = [sys.executable, *arguments]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -135,14 +131,8 @@ def test_the_same_files_in_a_folder_of_their_own_pass_the_checks(tmp_path: Path)
         name = f"{path.stem}_hypothesis.py" if "diagnosis" in path.parts else path.name
         (mine / name).write_text(block.replace("pyfmi_models.effects.wind_load", "wind_load"), "utf-8")
     (tmp_path / "tube.toml").write_text(blocks("toml")[0], "utf-8")
-    assert "wind_load" in cosim_in(tmp_path, "-m", "cosim", "show", "tube.toml", "--plugins", "mine")
+    assert "wind_load" in run(tmp_path, "-m", "cosim", "show", "tube.toml", "--plugins", "mine", own=False)
     (script,) = [block for block in blocks("python") if block.startswith("# check_mine.py")]
-    table = cosim_in(tmp_path, "-c", script)
+    table = run(tmp_path, "-c", script, own=False)
     assert table.count("passed") == 9, table
     assert table.count("not applicable") == 1, table
-
-
-def cosim_in(folder: Path, *arguments: str) -> str:
-    done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout

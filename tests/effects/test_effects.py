@@ -23,7 +23,6 @@ from pyfmi_models.effects import (
     Motion,
     SensorEffect,
     StribeckEffect,
-    TorqueOffset,
 )
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -117,12 +116,6 @@ def test_an_effect_acts_in_one_place(effect: Effect) -> None:
 # Loads
 
 
-def test_a_positive_offset_pushes_backward() -> None:
-    assert acceleration(TorqueOffset(torque=0.7)) < 0
-    assert "backward" in TorqueOffset(torque=0.7).statement()
-    assert "forward" in TorqueOffset(torque=-0.7).statement()
-
-
 def test_cycles_of_a_linear_axis_are_per_metre() -> None:
     effect = Cogging(cycles_per_rev=4, amplitude=1.0)
     for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
@@ -149,14 +142,6 @@ def test_the_delays_states_follow_the_dead_time_over_a_controllers_band() -> Non
     np.testing.assert_allclose(exact, np.exp(-1j * turn), rtol=1e-12)
     assert np.abs(np.angle(ours / exact)).max() < 1.5e-4  # what PADE_ORDER promises
     assert np.abs(np.abs(ours) - 1).max() < 1e-2  # strictly proper: it must fall off, but not in the band
-
-
-@pytest.mark.parametrize("order", [0, 1, 2, 3, 4, 5])
-def test_the_delays_states_have_the_moments_of_a_dead_time(order: int) -> None:
-    """Pade [2/3] agrees with exp(-sT) in the terms s^0 .. s^5 of its Taylor series."""
-    A, B, C, _ = state_space(Delay(delay_ms=1000.0))
-    term = -C @ np.linalg.matrix_power(np.linalg.inv(A), order + 1) @ B
-    assert term.item() == pytest.approx((-1.0) ** order / float(np.prod(np.arange(1, order + 1))), rel=1e-9)
 
 
 def test_the_plant_sends_the_command_through_its_drive_effects_in_series() -> None:

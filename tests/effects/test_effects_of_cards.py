@@ -8,11 +8,10 @@ from effect_examples import EXAMPLES, INERTIA, evaluate, mount, simulate
 from export_models import Driver
 from scipy.integrate import solve_ivp
 
-from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.trust.admission import check_effects
 from cosim.support.errors import InputError
 from pyfmi_models.card import parse_card
-from pyfmi_models.effects import CATALOGUE, GravityUnbalance
+from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.effects.bouc_wen import BoucWen
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
@@ -26,25 +25,10 @@ from pyfmi_models.export import build_library
 from pyfmi_models.friction import Coulomb, Frictionless
 from pyfmi_models.mount import Axis
 
-ASKED = """
-    friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
-    torque_offset constant_force cogging gravity_unbalance cable_wrap quadratic_drag periodic_disturbance
-    torque_saturation delay actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
-    concave_viscous axis_coupling
-"""
-"""What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
-OF_CARDS = ("dead_band", "gear_friction", "rough_spot", "torque_droop", "bouc_wen")
-
 
 def friction(*effects: Any, motion: str = "rotary", **values: float) -> float:
     """Friction torque of an axis with 1 N m of Coulomb friction, 3 N m s/rad and these effects."""
     return evaluate(mount(*effects, motion=motion).model(), **values)["friction"]
-
-
-def test_a_diagnosis_asks_for_what_it_did_and_for_none_of_these() -> None:
-    assert set(TRIED) == set(ASKED.split())
-    assert not set(OF_CARDS) & set(TRIED)
-    assert set(OF_CARDS) <= set(CATALOGUE)
 
 
 WEIGHT = GravityUnbalance(mgl=2.0, phase=0.3)

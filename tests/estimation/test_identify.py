@@ -129,12 +129,6 @@ def test_a_law_whose_damping_fades_is_identified_from_a_step_as_its_own_kind() -
     assert found.direct.values[:2] / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.003)
 
 
-def test_the_bias_of_the_linear_fit_vanishes_far_below_break_away() -> None:
-    card = the_card(**POSITIVE)
-    found = presliding(card, step_response(card, 0.02, 0.0, 0))
-    assert found.linear.values / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.02)
-
-
 @pytest.fixture(scope="module")
 def quasi_static() -> Recording:
     """One period of the paper's quasi-static sine: 0.04 Hz, peak 0.056 rad/s."""

@@ -116,10 +116,9 @@ def test_one_speed_leaves_a_number_at_the_cards_and_prints_none_that_its_error_s
     assert not re.search(r"\de[+-]\d", text)
 
 
-@pytest.mark.parametrize(("law", "words"), [(Silent(Fc=2.0), "has no torque in steady sliding")])
-def test_a_law_that_cannot_be_fitted_writes_no_card(law: FrictionLaw, words: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=words):
-        cosim.identify(slow(Coulomb(Fc=2.0, sigma2=8.0)), card_of(law), tmp_path / "out", free=("Fc",))
+def test_a_law_that_cannot_be_fitted_writes_no_card(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has no torque in steady sliding"):
+        cosim.identify(slow(Coulomb(Fc=2.0, sigma2=8.0)), card_of(Silent(Fc=2.0)), tmp_path / "out", free=("Fc",))
     assert not (tmp_path / "out" / "card.toml").exists()
 
 

@@ -35,6 +35,14 @@ def walked(law: FrictionLaw, v: np.ndarray, dt: float) -> np.ndarray:
     return np.array(states).T
 
 
+def carried(law: FrictionLaw) -> tuple[Piece, np.ndarray]:
+    """A recorded motion, and the states of the law that the inverse carries along it."""
+    t, q, _v, a = wander()
+    piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
+    inverse = Inverse(replace(read_card("paper_mount").plant(), friction=law), ())
+    return piece, inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
+
+
 class TestInverse:
     @pytest.mark.parametrize("law", [law for law in EXAMPLES.values() if law.key != "none"], ids=lambda law: law.key)
     def test_derivatives_equal_finite_differences(self, law: FrictionLaw) -> None:
@@ -56,11 +64,7 @@ class TestInverse:
 
     @pytest.mark.parametrize("law", WITH_MEMORY.values(), ids=WITH_MEMORY.keys())
     def test_friction_states_follow_the_recorded_speed_by_the_laws_own_step(self, law: FrictionLaw) -> None:
-        t, q, _v, a = wander()
-        mount = replace(read_card("paper_mount").plant(), friction=law)
-        piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
-        inverse = Inverse(mount, ())
-        states = inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
+        piece, states = carried(law)
         np.testing.assert_allclose(states, walked(law, piece.v, piece.dt), rtol=1e-9, atol=1e-9)
 
     @pytest.mark.parametrize("times", [1e-3, 0.0099, 0.0101, 0.3, 3.0, 40.0, 1e4])
@@ -74,11 +78,7 @@ class TestInverse:
     def test_friction_states_are_as_near_to_those_of_fine_steps_as_with_the_level_of_the_middle(
         self, law: FrictionLaw
     ) -> None:
-        t, q, _v, a = wander()
-        mount = replace(read_card("paper_mount").plant(), friction=law)
-        piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
-        inverse = Inverse(mount, ())
-        states = inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
+        piece, states = carried(law)
         rows = np.arange(len(piece.v) - 1)
         fine = np.interp((np.arange(50 * len(rows)) + 0.5) / 50, np.arange(len(piece.v)), piece.v)
         exact = numeric(law).along(fine, piece.dt / 50)[:, 49::50]

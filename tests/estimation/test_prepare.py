@@ -5,7 +5,7 @@ import pytest
 from wandering import recorded, wander
 
 from cosim.data.recording import Recording
-from cosim.estimation.blocks import Blocks
+from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.filters import derivative, lowpass, noise_of
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import choose_cutoff, prepare, quality
@@ -120,3 +120,13 @@ def test_what_is_thinned_keeps_no_full_recording_alive() -> None:
     signals = (piece.t, piece.q, piece.v, piece.a, *piece.extras.values())
     assert len(piece.t) < len(t) / 10
     assert all(one.flags.owndata for one in signals)
+
+
+def test_a_number_that_acts_on_no_row_leaves_the_others_their_errors() -> None:
+    """A derivative may be as small as the tail of a bell, and its square none."""
+    rng = np.random.default_rng(1)
+    slopes, left = rng.standard_normal((600, 2)), rng.standard_normal(600)
+    blocks = Blocks(tuple(np.split(np.arange(600), 12)), np.zeros(600, int))
+    alone = covariance(slopes, left, blocks)
+    beside = covariance(np.column_stack([slopes, np.full(600, 1e-160)]), left, blocks)
+    np.testing.assert_allclose(beside[:2, :2], alone, rtol=1e-9)

@@ -104,18 +104,6 @@ def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypa
     np.testing.assert_allclose(found.slopes, slopes, rtol=1e-6, atol=1e-6)
 
 
-def test_evaluations_are_spent_once(prepared: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-
-    def counted(inverse: Inverse, *arguments: object) -> tuple[np.ndarray, np.ndarray]:
-        asked.append(len(inverse.by))
-        return stacked(inverse, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(fitting, "stacked", counted)
-    fit(replace(MOUNT, effects=(PLAY,)), prepared.pieces, np.ones(len(prepared.recording_of)), MOUNT, 4)
-    assert len(asked) == 4
-
-
 def test_a_prior_that_is_a_share_of_the_misfit_has_exact_derivatives() -> None:
     rng, pull = np.random.default_rng(4), fitting._Prior(np.array([2.0, 0.0, 0.5]))
     rest, slopes, values = rng.normal(size=30), rng.normal(size=(30, 3)), np.array([3.0, -1.0, 0.2])

@@ -110,25 +110,38 @@ def description(version: int, variables: Sequence[Row] = VARIABLES, model: str =
     )
 
 
-def recorded(fmu: Path, truth: dict[str, float], seed: int = 1, rows: int = 400, noise: float = 0.02) -> dict:
-    """Columns of the motor with these numbers, with white noise on both outputs."""
+def driven(
+    fmu: Path,
+    given: np.ndarray,
+    truth: dict[str, float] | None = None,
+    *,
+    into: str = "i",
+    outputs: Sequence[str] = ("w", "phi"),
+    step: float = 0.01,
+) -> dict[str, np.ndarray]:
+    """What an FMU with these numbers answers to the samples of an input, a row a sample."""
     from cosim.master.simulate import simulate
     from cosim.system.system import System
     from cosim.system.wire import Record, Wire
 
-    random = np.random.default_rng(seed)
-    t = 0.01 * np.arange(rows)
-    current = 3 * np.sin(2 * np.pi * (0.3 + 0.4 * t) * t) + random.choice([-1.0, 1.0]) * (t % 1.3 > 0.7)
     system = System(
         components={"m": fmu},
-        records={"w": Record("m.w"), "phi": Record("m.phi")},
-        wires=[Wire("i.value", "m.i")],
-        signals={"i": current},
-        parameters={"m": truth},
-        step=0.01,
-        ticks=rows - 1,
+        records={name: Record(f"m.{name}") for name in outputs},
+        wires=[Wire("given.value", f"m.{into}")],
+        signals={"given": given},
+        parameters={"m": truth or {}},
+        step=step,
+        ticks=len(given) - 1,
         last=True,
     )
     table = simulate(system).recording.table
-    noisy = {name: table[name] + noise * random.standard_normal(rows) for name in ("w", "phi")}
+    return {name: table[name] for name in outputs}
+
+
+def recorded(fmu: Path, truth: dict[str, float], seed: int = 1, rows: int = 400, noise: float = 0.02) -> dict:
+    """Columns of the motor with these numbers, with white noise on both outputs."""
+    random = np.random.default_rng(seed)
+    t = 0.01 * np.arange(rows)
+    current = 3 * np.sin(2 * np.pi * (0.3 + 0.4 * t) * t) + random.choice([-1.0, 1.0]) * (t % 1.3 > 0.7)
+    noisy = {name: one + noise * random.standard_normal(rows) for name, one in driven(fmu, current, truth).items()}
     return {"t": t, "i": current, **noisy}

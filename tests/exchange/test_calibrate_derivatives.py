@@ -4,15 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from motor_fmu import motor, recorded
+from motor_fmu import driven, motor, recorded
 
 import cosim
 from cosim.calibration.calibrate import Options, calibrate
 from cosim.calibration.residuals import Residuals
 from cosim.calibration.subject import of_fmu
-from cosim.master.simulate import simulate
-from cosim.system.system import System
-from cosim.system.wire import Record, Wire
 
 FREE = ("axis.inertia", "friction.Fc", "friction.sigma2")
 
@@ -28,17 +25,8 @@ def plant(tmp_path_factory) -> Path:
 def table(plant) -> dict:
     t = 5e-4 * np.arange(1600)
     tau = 20 * np.sin(2 * np.pi * 1.5 * t) + 8 * np.sin(2 * np.pi * 4.1 * t)
-    system = System(
-        components={"m": plant},
-        records={"v": Record("m.v")},
-        wires=[Wire("tau.value", "m.tau")],
-        signals={"tau": tau},
-        parameters={"m": {"axis.inertia": 36.0, "friction.Fc": 1.3}},
-        step=5e-4,
-        ticks=1599,
-        last=True,
-    )
-    v = simulate(system).recording["v"]
+    truth = {"axis.inertia": 36.0, "friction.Fc": 1.3}
+    v = driven(plant, tau, truth, into="tau", outputs=["v"], step=5e-4)["v"]
     noise = 1e-3 * np.std(v) * np.random.default_rng(1).standard_normal(1600)
     return {"t": t, "tau": tau, "v": v + noise}
 

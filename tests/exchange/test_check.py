@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 from commands import call as verb
 from experiment_archives import bundle, experiments, manifest, with_files
-from motor_fmu import motor
+from motor_fmu import driven, motor
 
 import cosim
-from cosim.master.simulate import simulate
-from cosim.system.system import System
-from cosim.system.wire import Record, Wire
 
-ROWS = 201
-T = 0.01 * np.arange(ROWS)
+T = 0.01 * np.arange(201)
 CURRENT = 3 * np.sin(2 * np.pi * (0.5 + T) * T) * (T > 0.1)
 CAUSES = {
     1: "the sign is the other one",
@@ -40,17 +36,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(folder) -> dict[str, dict]:
-    system = System(
-        components={"m": motor(folder, 3)},
-        records={"w": Record("m.w"), "phi": Record("m.phi")},
-        wires=[Wire("i.value", "m.i")],
-        signals={"i": CURRENT},
-        step=0.01,
-        ticks=ROWS - 1,
-        last=True,
-    )
-    table = simulate(system).recording.table
-    return {"stimulus": {"time": T, "i": CURRENT}, "reference": {"time": T, "w": table["w"], "phi": table["phi"]}}
+    return {"stimulus": {"time": T, "i": CURRENT}, "reference": {"time": T, **driven(motor(folder, 3), CURRENT)}}
 
 
 class InThisProcess:

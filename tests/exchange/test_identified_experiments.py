@@ -6,15 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from experiment_archives import FOLDER, bundle, manifest, with_files
-from motor_fmu import motor, recorded
+from motor_fmu import driven, motor, recorded
 
 import cosim
 from cosim.calibration.left_behind import MANIFEST, left_behind
 from cosim.fmi.manifest import manifest_of
 from cosim.fmi.own_starts import MEMBER, as_member, own_starts
-from cosim.master.simulate import simulate
-from cosim.system.system import System
-from cosim.system.wire import Record, Wire
 
 T = 0.01 * np.arange(101)
 
@@ -24,16 +21,7 @@ def carrying(tmp_path_factory) -> Path:
     """The motor with an experiment that it passes as it is."""
     folder = tmp_path_factory.mktemp("carrying")
     fmu, current = motor(folder, 3), 2 * np.sin(9 * T)
-    system = System(
-        components={"m": fmu},
-        records={"w": Record("m.w")},
-        wires=[Wire("i.value", "m.i")],
-        signals={"i": current},
-        step=0.01,
-        ticks=100,
-        last=True,
-    )
-    reference = {"time": T, "w": simulate(system).recording.table["w"]}
+    reference = {"time": T, "w": driven(fmu, current)["w"]}
     return with_files(fmu, folder / "carrying.fmu", bundle({"time": T, "i": current}, reference))
 
 

@@ -86,12 +86,6 @@ def test_a_system_in_hand_says_it_while_it_is_stepped_and_warns_at_the_end(folde
     assert len(warned) == 2
 
 
-def test_a_system_in_hand_within_the_range_says_nothing(folder):
-    with cosim.open(folder / "system.toml") as s:
-        s.step(50)
-        assert s.outside == ()
-
-
 def test_a_run_within_the_range_says_nothing(folder):
     assert cosim.run(folder / "system.toml", stop=0.5).statistics["outside"] == []
 

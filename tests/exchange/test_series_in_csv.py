@@ -3,7 +3,6 @@
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cosim.experiments.series import Series, series_of
@@ -53,11 +52,3 @@ def test_each_cell_goes_to_its_variable(tmp_path: Path) -> None:
 def test_what_is_no_series_is_refused_with_its_place(text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(FmuError, match=said):
         read(tmp_path, text)
-
-
-def test_a_table_in_hdf5_is_called_by_its_name(tmp_path: Path) -> None:
-    with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
-        archive.writestr("in.csv", b"\x89HDF\r\n\x1a\n" + bytes(20))
-    with pytest.raises(FmuError, match=r"no CSV but binary .HDF5."):
-        series_of(tmp_path / "a.fmu", "in.csv", PORTS)
-    assert np.isfinite(read(tmp_path, "time,x\n0,1\n1,1\n").times).all()

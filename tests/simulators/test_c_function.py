@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
-from fmpy.simulation import instantiate_fmu
+from nested_runs import InFmpy
 
 from cosim.api.export import export
 from pyfmi_models.card import read_card
@@ -33,18 +32,12 @@ def compiled(folder: Path, program: str) -> Path:
 
 
 def in_fmpy(path: Path, inputs: np.ndarray) -> np.ndarray:
-    description = read_model_description(path)
-    place = {one.name: one.valueReference for one in description.modelVariables}
-    fmu = instantiate_fmu(extract(path), description, "CoSimulation")
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    outputs = [place[one.name] for one in description.modelVariables if one.causality == "output"]
-    rows = []
-    for k, row in enumerate(inputs):
-        fmu.setFloat64([place["tau"], place["disturbance"]], list(row))
-        fmu.doStep(k * STEP, STEP)
-        rows.append(list(fmu.getFloat64(outputs)))
-    return np.array(rows)
+    fmu = InFmpy(path, STEP)
+    fmu.start()
+    outputs = [one.name for one in fmu.description.modelVariables if one.causality == "output"]
+    rows = fmu.run(outputs, len(inputs), inputs={"tau": inputs[:, 0], "disturbance": inputs[:, 1]})
+    fmu.close()
+    return np.column_stack([rows[name][1:] for name in outputs])
 
 
 @pytest.mark.parametrize(("card", "size"), [("paper_mount", 1.0), ("emps", 10.0)])

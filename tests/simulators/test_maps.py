@@ -80,11 +80,8 @@ def test_an_fmu_carries_its_maps_and_stays_valid(card: Path, tmp_path: Path) -> 
     assert [one["name"] for one in told["maps"]] == ["learned", "learned2"]
 
 
-def test_a_flat_map_is_drawn_too() -> None:
+def test_a_map_is_drawn_from_end_to_end_in_one_line() -> None:
     assert curve([2.0, 2.0]) == "▁▁"
-
-
-def test_a_long_map_is_drawn_from_end_to_end_in_one_line() -> None:
     drawn = curve([float(k) for k in range(101)])
     assert len(drawn) == WIDTH
     assert (drawn[0], drawn[-1]) == ("▁", "█")

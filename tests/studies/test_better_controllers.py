@@ -15,14 +15,14 @@ from cosim_studies.paper.comparison_tables import better, frontier_text, rows_cs
 from cosim_studies.paper.conditions import condition, tuned
 from cosim_studies.paper.frontier import Design, choice, designs, frontier
 from cosim_studies.paper.margins import Linear, Margins, feedback, held, margins
-from cosim_studies.paper.options import ADAPTING, REFERENCE, Option, options, repeating, settled
+from cosim_studies.paper.options import ADAPTING, REFERENCE, Option, options
 from cosim_studies.paper.price import loops, price
 from cosim_studies.paper.report import rendered
 from cosim_studies.paper.robustness import Stress, stresses
 from cosim_studies.paper.workshop import Workshop
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.card_writer import card_text
-from pyfmi_models.effects import ActuatorLag, FrictionWander
+from pyfmi_models.effects import ActuatorLag
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Frictionless
 
@@ -130,14 +130,6 @@ def test_the_keys_of_an_option_make_it_in_a_card(option: Option) -> None:
     assert [one.name for one in card.controller_model().states] == [
         one.name for one in where.controller.controller_model().states
     ]
-
-
-def test_settled_and_repeating_conditions_differ_in_nothing_else() -> None:
-    where = condition(B)
-    assert settled(where).run_in == 30
-    assert replace(settled(where), key=where.key, title=where.title, run_in=0.0) == where
-    assert not any(isinstance(one, FrictionWander) for one in repeating(where).plant.effects)
-    assert len(repeating(where).plant.effects) == len(where.plant.effects) - 1
 
 
 def test_a_stress_adds_what_it_says() -> None:

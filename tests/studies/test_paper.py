@@ -24,8 +24,6 @@ from cosim_studies.paper.study import Study, Trial, everywhere, job, study
 from cosim_studies.paper.tables import PAPER, in_order, statistics
 from cosim_studies.paper.workshop import Workshop
 from pyfmi_models.card import read_card
-from pyfmi_models.friction import LuGre
-from pyfmi_models.model import Pair
 
 LOOP = Path(__file__).parent / "paper_loop.c"
 
@@ -125,11 +123,6 @@ def test_models_that_differ_in_numbers_share_an_fmu(workshop: Workshop) -> None:
     assert two.parameters["friction.Fs"] == 2 * one.parameters["friction.Fs"]
     directional = workshop.build(read_card("paper_mount_directional").plant().model())
     assert directional.path != one.path
-
-
-def test_scaled_friction_keeps_its_directions() -> None:
-    law = scaled(LuGre(sigma0=1e4, sigma1=9.0, Fc=Pair(2.0, 3.0), Fs=4.0, Vs=0.1), 2.0, 0.5)
-    assert law == LuGre(sigma0=5e3, sigma1=9.0, Fc=Pair(4.0, 6.0), Fs=8.0, Vs=0.1)
 
 
 def test_statistics_are_means_of_ratios() -> None:

@@ -1,6 +1,6 @@
 """A slave of EtherCAT in software, for a veth pair: registers, EEPROM, mailbox with CoE, and process data by FMMUs.
 
-python tests/hardware/ethercat_slave.py INTERFACE      (prints a line when it listens; needs the rights of root)
+python bench/ethercat_slave.py INTERFACE      (prints a line when it listens; needs the rights of root)
 
 As much of ETG.1000 as SOEM uses to bring up one drive. What the drive does with its objects is `fake_soem.Slave`.
 """
@@ -8,6 +8,9 @@ As much of ETG.1000 as SOEM uses to bring up one drive. What the drive does with
 import socket
 import struct
 import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "tests/hardware"))
 
 from fake_soem import OP_STATE, SAFEOP_STATE, Slave
 

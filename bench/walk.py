@@ -1,4 +1,4 @@
-"""How many files a command walks through: python tests/house/walk.py run sidereal --out OUT
+"""How many files a command walks through: python bench/walk.py run sidereal --out OUT
 
 Runs a command line in this process and notes each call from one file of the packages to another, in the order in which
 they first occur. Printed are files, hops (pairs of files, each counted once), returns (hops into a file that an earlier

@@ -1,4 +1,4 @@
-"""A system run by the master and as one FMU in FMPy, for tests of the nesting."""
+"""An FMU stepped in FMPy, and a system run by the master and as one such FMU."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,14 +14,14 @@ from cosim.system.system import System
 Rows = dict[str, np.ndarray]
 
 
-class Nested:
-    """The FMU of a system in FMPy."""
+class InFmpy:
+    """An FMU in FMPy; its steps are those of its default experiment unless another is given."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, step: float | None = None) -> None:
         self.description = read_model_description(path)
         self.places = {one.name: one.valueReference for one in self.description.modelVariables}
         self.fmu = instantiate_fmu(extract(path), self.description, "CoSimulation")
-        self.step = float(self.description.defaultExperiment.stepSize)
+        self.step = step or float(self.description.defaultExperiment.stepSize)
         two = self.description.fmiVersion == "2.0"
         self._set, self._get = (
             (self.fmu.setReal, self.fmu.getReal) if two else (self.fmu.setFloat64, self.fmu.getFloat64)
@@ -54,11 +54,11 @@ class Nested:
         self.fmu.freeInstance()
 
 
-def nested(system: System, folder: Path, fmi: int) -> Nested:
+def nested(system: System, folder: Path, fmi: int) -> InFmpy:
     """Export a system and load it."""
     path = folder / f"system{fmi}.fmu"
     nest(system, {fmi: path})
-    return Nested(path)
+    return InFmpy(path)
 
 
 def both(system: System, folder: Path, fmi: int, every: int = 1) -> tuple[Rows, Rows]:
