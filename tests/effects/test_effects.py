@@ -136,14 +136,6 @@ def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect)
 # Drive
 
 
-def test_the_delays_states_follow_the_dead_time_over_a_controllers_band() -> None:
-    delay, turn = Delay(delay_ms=4.0), np.linspace(0.01, 1.3, 60)  # omega T
-    exact, ours = delay.response(turn / 4e-3), frequency_response(delay, turn / 4e-3)
-    np.testing.assert_allclose(exact, np.exp(-1j * turn), rtol=1e-12)
-    assert np.abs(np.angle(ours / exact)).max() < 1.5e-4  # what PADE_ORDER promises
-    assert np.abs(np.abs(ours) - 1).max() < 1e-2  # strictly proper: it must fall off, but not in the band
-
-
 def test_the_plant_sends_the_command_through_its_drive_effects_in_series() -> None:
     drives = (Delay(delay_ms=4.0), ActuatorLag(time_constant_ms=3.0))
     model = Mount(name="m", axis=Axis(inertia=2.0), friction=Coulomb(Fc=0.0), effects=drives).model()

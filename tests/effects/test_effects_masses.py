@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_examples import INERTIA, evaluate, example, mount, simulate
+from effect_examples import INERTIA, evaluate, example, mount
 from test_effects_equations import FORM, near, sign
 
 from pyfmi_models.effects import (
@@ -22,8 +22,8 @@ from pyfmi_models.effects import (
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
-from pyfmi_models.friction import Coulomb, Frictionless, LuGre
+from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
+from pyfmi_models.friction import Coulomb, LuGre
 
 
 def test_a_spring_between_two_masses_is_its_equation_in_time_and_over_frequency() -> None:
@@ -141,17 +141,6 @@ def test_the_temperature_is_an_input_that_starts_at_20_degrees_and_is_shared() -
     assert len(mount().model().inputs) == 2
 
 
-def test_rubbing_heats_a_bearing_and_rest_cools_it() -> None:
-    """Rise to h |v| tau at constant speed; a balanced torque keeps the speed of 1 rad/s."""
-    effect = RubbedViscosity(viscous_per_degC=0.0, heat_degC_per_rad=0.5, cooling_s=20.0)
-    run = simulate(mount(effect).model(), np.array([0.0, 20.0, 400.0]), lambda t: 4.0)
-    speed = (4.0 - 1.0) / 3.0
-    assert run["v"][-1] == pytest.approx(speed, rel=1e-6)
-    assert run["thermal_viscosity.rise"][-1] == pytest.approx(0.5 * speed * 20.0, rel=1e-3)
-    at_rest = simulate(mount(effect).model(), np.array([0.0, 20.0, 60.0]), start={"thermal_viscosity.rise": 10.0})
-    np.testing.assert_allclose(at_rest["thermal_viscosity.rise"], 10.0 * np.exp([0.0, -1.0, -3.0]), rtol=1e-6)
-
-
 def test_friction_grows_with_the_weights_on_the_axis_and_with_nothing_else() -> None:
     effect, weight = LoadDependentFriction(coulomb_per_Nm=0.2), GravityUnbalance(mgl=5.0, phase=0.1)
     for q in (-1.0, 0.0, 1.4):
@@ -192,8 +181,3 @@ def test_presliding_replaces_the_bristles_of_a_law_that_has_its_own() -> None:
     assert [s.name for s in model.states] == ["position", "speed", "friction.bristle"]
     sliding = evaluate(model, speed=0.05, **{"friction.bristle": float(law.level(0.05))})
     assert sliding["der(friction.bristle)"] == pytest.approx(0, abs=1e-9)  # its level is still the law's
-
-
-def test_bristles_without_friction_carry_nothing() -> None:
-    found = evaluate(mount(Presliding(sigma0=2e4), friction=Frictionless()).model(), speed=0.3, tau=1.0)
-    assert found["der(speed)"] == pytest.approx(1.0 / INERTIA, abs=1e-6)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import EXAMPLES, evaluate, mount, simulate
-from export_models import Driver
+from effect_examples import EXAMPLES, evaluate, mount
 
 from pyfmi_models.card import parse_card
 from pyfmi_models.card_writer import card_text
@@ -15,8 +14,6 @@ from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.errors import CardError
-from pyfmi_models.export import build_library
-from pyfmi_models.friction import LuGre
 
 LEARNED = [one for one in EXAMPLES if one.id == "learned"]
 NAMED = pytest.mark.parametrize("effect", LEARNED, ids=lambda one: type(one).__name__)
@@ -24,25 +21,11 @@ CARD = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 
 OVER_POSITION = {"over": "position", "seen": (-1.0, 1.2), "torque": (0.3, 0.5, -0.2, 0.1)}
 
 
-def table(x: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
-    """The sum of the docstring, x from 0 to 1."""
-    place = np.clip(x, 0, 1)
-    return sum(c * np.cos(np.pi * k * place) for k, c in enumerate(coefficients))
-
-
 @NAMED
 def test_a_card_keeps_every_digit_of_a_table(effect) -> None:
     given = parse_card(CARD, "a.toml")
     back = parse_card(card_text(replace(given, effects=(effect, effect))), "b.toml")
     assert back.effects == (effect, effect)
-
-
-def test_a_table_is_drawn_over_the_range_that_was_seen_and_one_of_the_turn_over_all_of_it() -> None:
-    at, torque = LearnedTorque(**OVER_POSITION).values(5)
-    np.testing.assert_allclose(at, np.linspace(-1.0, 1.2, 5))
-    np.testing.assert_allclose(torque, table((at + 1.0) / 2.2, OVER_POSITION["torque"]), atol=1e-12)
-    turned, _ = LearnedTorque(over="turn", torque=(0.1, 0.2, 0.3)).values(3)
-    np.testing.assert_allclose(turned, [-np.pi, 0.0, np.pi])
 
 
 def test_what_goes_over_the_way_counts_it_there_and_back() -> None:
@@ -107,31 +90,6 @@ def test_elements_are_named_from_one_on_and_remember_a_direction(kind: type[Effe
     states = effect.states()
     assert [one.name for one in states] == [f"memory{k + 1}" for k in range(len(states))]
     assert {(one.low, one.high, one.start, one.unit) for one in states} == {(-1, 1, 0, "1")}
-
-
-def test_an_element_forgets_a_reversal_over_its_way_or_its_time() -> None:
-    effect = LearnedAfterReversal(ways=(0.1,), times=(0.25,), level_change=(0.5, 0.5))
-    here, speed, dt = mount(effect).at(0.0, 0.0, 0.2), 0.2, 1e-4
-    state = -np.ones(2)
-    for _ in range(2500):  # 0.25 s, 0.05 rad
-        state = state + dt * np.array(ca.DM(effect.rate(here._replace(state=state)))).ravel()
-    np.testing.assert_allclose(state, 1 - 2 * np.exp([-speed * 0.25 / 0.1, -1.0]), atol=2e-4)
-
-
-@NAMED
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_steps_as_the_equations_of_a_learned_term_say(effect, fmi: int) -> None:
-    law = LuGre(sigma0=2e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.05)
-    model = mount(effect, friction=law).model()
-    given = {"temperature": 31.0} if any(one.name == "temperature" for one in model.inputs) else {}
-    run = simulate(model, np.array([0.0, 0.2]), lambda t: 6.0, **given)
-    driver = Driver(model, build_library(model), fmi)
-    driver.start(tolerance=1e-9, **given)
-    driver.set("tau", 6.0)
-    driver.run(0, 200, 1e-3)
-    expected = [run[name][-1] for name in ("q", "v")]
-    assert abs(expected[0]) > 1e-3
-    np.testing.assert_allclose(driver.get("q", "v"), expected, rtol=1e-6)
 
 
 def test_the_range_is_in_the_description_of_the_model() -> None:

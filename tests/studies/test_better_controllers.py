@@ -22,7 +22,6 @@ from cosim_studies.paper.robustness import Stress, stresses
 from cosim_studies.paper.workshop import Workshop
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.card_writer import card_text
-from pyfmi_models.effects import ActuatorLag
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Frictionless
 
@@ -191,13 +190,6 @@ def test_the_papers_loop_has_the_margins_of_the_errata() -> None:
     assert [round(one.phase) for one in fourth] == pytest.approx([35, 38], abs=1)
     assert [1e3 * one.delay for one in fourth] == pytest.approx([6.4, 4.1], abs=0.1)
     assert [one.Ms for one in fourth] == pytest.approx([1.82, 1.73], abs=0.02)
-
-
-def test_a_lag_of_the_drive_costs_its_angle_at_the_crossover() -> None:
-    plant, controller = loop()
-    slow = held(replace(FREE, effects=(ActuatorLag(time_constant_ms=0.5),)).plant().model(), H, {})
-    with_lag, without = margins(slow, controller), margins(plant, controller)
-    assert without.phase - with_lag.phase == pytest.approx(np.degrees(without.crossover * 0.5e-3), abs=0.3)
 
 
 def test_ms_is_the_largest_sensitivity_on_the_unit_circle() -> None:
