@@ -1,14 +1,27 @@
 """A session cycle by cycle against a loop that only counts."""
 
+import re
+import resource
+import socket
 from collections.abc import Callable
+from pathlib import Path
+from time import monotonic, sleep
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from on_hardware import SIMULATED, scenario
 
-from cosim.hardware.loops import Called, Forked, Threaded
+from cosim.data.recording import Recording
+from cosim.hardware import loops, move
+from cosim.hardware.loops import Called, Forked, Threaded, bare_clock
+from cosim.hardware.machine import Machine
 from cosim.hardware.session import Session, run_session
+from cosim.hardware.story import Story
 from cosim.hardware.structures import LIMITS as MANY
+from cosim.hardware.structures import CSession
+from cosim.hardware.udp import reach
 from cosim.hardware.words import ASK_ENABLE, ASK_ESTOP, ASK_QUICK_STOP, ASK_RESET, LIMITS
 from cosim.support.errors import HardwareError
 
@@ -174,3 +187,165 @@ def test_a_loop_whose_process_is_gone_says_how_it_ended(code: int, how: str) -> 
     with pytest.raises(HardwareError, match=f"The process of the loop has ended {how}; the drive's watchdog") as caught:
         loop.go(1)
     assert caught.value.value == code
+
+
+# What moves, loops, sockets and drives wait for and ask, against stand-ins that note it; what a replay needs.
+
+
+def moving(monkeypatch: pytest.MonkeyPatch, torques: list[float], inertias: list[float]) -> list[tuple[Any, ...]]:
+    """Let each move of a test move need a torque and show an inertia; what was asked for."""
+    asked: list[tuple[Any, ...]] = []
+    need = iter(torques)
+
+    def moved(what: Any, machine: Machine, way: float, needed: float, fast: bool) -> Recording:
+        asked.append((what.ticks, machine.adapter, way, needed, fast))
+        return Recording("move", {"t": np.zeros(2), "machine.order": np.array([0.0, -next(need)])})
+
+    seen = iter(inertias)
+    monkeypatch.setattr(move, "_moved", moved)
+    monkeypatch.setattr(move, "_inertia", lambda *_: next(seen))
+    return asked
+
+
+def test_a_move_takes_a_fifth_of_the_following_error_and_a_quarter_of_the_torque(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Needed at first: twice a quarter; so the way is halved, and then it stays."""
+    limits = SIMULATED.limits
+    quarter = limits.torque / 4
+    asked = moving(monkeypatch, [2 * quarter, quarter, 0.9 * quarter], [30.0, 31.0])
+    found = move.try_move(scenario(), SIMULATED)
+    way = 0.2 * limits.following_error
+    assert [one[2] for one in asked] == pytest.approx([way, way / 2, way / 2])
+    assert [one[3] for one in asked] == pytest.approx([limits.torque, limits.torque, quarter])
+    assert [one[4] for one in asked] == [True, True, False]
+    assert {one[0] for one in asked} == {7000}, "six periods and one more at 10 Hz, 0.1 ms each"
+    assert (found.way, found.expected, found.seen) == (pytest.approx(way / 2), 30.0, 31.0)
+    assert found.torque == pytest.approx(0.9 * quarter)
+
+
+@pytest.mark.parametrize(("seen", "good"), [(1.49, True), (0.67, True), (1.51, False), (0.66, False)])
+def test_a_move_is_right_up_to_a_factor_of_one_and_a_half(
+    seen: float, good: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moving(monkeypatch, [1.0] * 3, [1.0, seen])
+    if good:
+        assert move.try_move(scenario(), SIMULATED, fast=True).scale == pytest.approx(1 / seen)
+        return
+    with pytest.raises(HardwareError, match=f"as if its encoder had about {1 / seen:.2g} times the counts"):
+        move.try_move(scenario(), SIMULATED, fast=True)
+
+
+def library_of(calls: list[Any], **also: Any) -> Any:
+    """A library whose functions note that they were called."""
+    names = ("hardware_run", "hardware_release", "hardware_bare")
+    made = {name: lambda *given, name=name: calls.append((name, *given[1:])) for name in names}
+    return lambda: SimpleNamespace(**(made | also))
+
+
+def test_a_loop_in_a_thread_runs_until_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    session = SimpleNamespace(stop=0)
+
+    def run(*given: Any) -> None:
+        while not session.stop:
+            sleep(0.001)
+        sleep(0.05)  # its last cycle
+        calls.append(("hardware_run", *given[1:]))
+
+    monkeypatch.setattr(loops, "library", library_of(calls, hardware_run=run))
+    one = Threaded(session, "sample")  # type: ignore[arg-type]
+    one.start()
+    one.go(3)
+    one.stop()
+    assert session.stop == 1
+    assert calls == [("hardware_run", "sample", 2**62), ("hardware_release",)], "no torque once its last cycle is over"
+
+
+def test_a_bare_clock_is_asked_in_nanoseconds_and_answers_in_microseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def bare(session: CSession, edges: int) -> None:
+        asked.append((session.period, session.spin, edges))
+        session.tick, session.late, session.worst = edges, 3, 12_500
+
+    monkeypatch.setattr(loops, "library", lambda: SimpleNamespace(hardware_bare=bare))
+    assert bare_clock(1.0, 20.0, 30.4) == (30, 3, 12.5)
+    assert asked == [(1_000_000_000, 20_000, 30)]
+
+
+def test_a_clock_sleeps_between_its_edges_and_is_not_early() -> None:
+    """20 cycles of 10 ms, awake for the last 20 us of each: one that spins gives its processor up 4 times in all."""
+    bare_clock(0.001, 0.0, 0.001)  # what is loaded once
+    began, before = monotonic(), resource.getrusage(resource.RUSAGE_SELF)
+    edges, late, _ = bare_clock(0.01, 20.0, 0.2)
+    slept = resource.getrusage(resource.RUSAGE_SELF).ru_nvcsw - before.ru_nvcsw
+    assert edges + late >= 20
+    assert monotonic() - began >= 0.01 * 19
+    assert slept >= edges / 2
+
+
+def test_a_socket_waits_a_fifth_of_a_second_and_talks_to_one_place_only() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
+        there.bind(("127.0.0.1", 0))
+        one = reach(f"udp://127.0.0.1:{there.getsockname()[1]}")
+        assert one.gettimeout() == 0.2
+        assert one.getpeername() == there.getsockname()
+        one.close()
+
+
+STORY: dict[str, Any] = {
+    "step": 1e-3,
+    "quantum": 1e-6,
+    "inputs": ["q", "q_d"],
+    "encoder": "q",
+    "output": "tau",
+    "units": {},
+    "machine": SIMULATED.model_dump(),
+    "controller": {"sha256": "0" * 64},
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "good"),
+    [
+        ({}, True),
+        ({"quantum": 1e-30}, True),
+        ({"quantum": 1e30}, True),
+        ({"quantum": 0.99e-30}, False),
+        ({"quantum": 1.01e30}, False),
+        ({"inputs": ["q_d", *(f"i{k}" for k in range(6)), "q"]}, True),
+        ({"inputs": ["q_d", *(f"i{k}" for k in range(7)), "q"]}, False),
+        ({"inputs": ["q_d"], "encoder": "q_d"}, True),
+        ({"inputs": []}, False),
+        ({"encoder": "p"}, False),
+        ({"inputs": ["q", "p"]}, False),
+        ({"controller": {"sha256": "0" * 63}}, False),
+        ({"controller": {"sha256": "G" * 64}}, False),
+        ({"more": 1}, True),
+    ],
+)
+def test_a_story_has_what_a_replay_needs(changes: dict[str, Any], good: bool) -> None:
+    if good:
+        assert Story.model_validate(STORY | changes).encoder == changes.get("encoder", "q")
+        return
+    with pytest.raises(ValueError, match="validation error"):
+        Story.model_validate(STORY | changes)
+
+
+def test_a_solver_says_why_it_failed_by_the_number_that_c_gives() -> None:
+    from cosim.master import exchange
+
+    header = Path(exchange.__file__).with_name("loop") / "rodas4.h"
+    body = re.search(r"enum \{ SOLVED, ([^}]*?) \}", header.read_text("utf-8"))
+    assert body is not None
+    words = {
+        "SINGULAR": "singular",
+        "NOT_FINITE": "not finite",
+        "STEP_TOO_SMALL": "too small",
+        "TOO_MANY_STEPS": "million",
+    }
+    said = {number: words[name] for number, name in enumerate(body[1].split(", "), 1)}
+    assert list(said) == list(exchange._REASONS)
+    assert all(word in exchange._REASONS[number] for number, word in said.items())
+    assert exchange.TOLERANCE == 1e-8
