@@ -1,7 +1,6 @@
 """A folder of machines: paired by name, gone on with after a kill, on a cluster too, and from Python."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -41,10 +40,6 @@ def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def lines_of(text: str) -> dict[str, dict[str, object]]:
-    return {one["machine"]: one for one in map(json.loads, text.splitlines())}
-
-
 def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
     fleet: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -65,11 +60,14 @@ def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
     assert "holds several: north, south" in capsys.readouterr().err
 
 
-def test_what_was_done_before_a_kill_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "1"]
+def test_what_was_done_before_a_kill_is_not_done_again_also_without_a_folder_that_is_named(
+    fleet: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COSIM_OUT", "")
+    words, out = ["diagnose", "all", "--quick", "--json", "--workers", "1"], fleet / "cosim_out" / "all-1"
     process = subprocess.Popen(
         mortal(sys.executable, "-m", "cosim", *words),
-        env=ENVIRONMENT,
+        env=ENVIRONMENT | {"COSIM_OUT": ""},
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
     )
@@ -78,17 +76,20 @@ def test_what_was_done_before_a_kill_is_not_done_again(fleet: Path, capsys: pyte
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stdout.close()
-    kept = (fleet / "found" / first / "diagnosis.json").stat().st_mtime_ns
-    with (fleet / "found" / "machines.jsonl").open("a") as journal:
+    kept = (out / first / "diagnosis.json").stat().st_mtime_ns
+    with (out / "machines.jsonl").open("a") as journal:
         journal.write('{"machine": "sou')  # what a kill leaves half written
     assert call(*words) == 0
-    told = lines_of(capsys.readouterr().out)
+    said = capsys.readouterr()
+    told = {one["machine"]: one for one in map(json.loads, said.out.splitlines())}
+    assert "where they were begun" in said.err
     assert sorted(told) == sorted(LEVELS)
     assert not any("error" in one for one in told.values())
-    assert (fleet / "found" / first / "diagnosis.json").stat().st_mtime_ns == kept
-    before = {path: path.stat().st_mtime_ns for path in (fleet / "found").rglob("diagnosis.json")}
+    assert (out / first / "diagnosis.json").stat().st_mtime_ns == kept
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("diagnosis.json")}
     assert call(*words) == 0
     assert before == {path: path.stat().st_mtime_ns for path in before}
+    assert [one.name for one in out.parent.iterdir()] == ["all-1"]
 
 
 def test_no_process_outlives_a_kill(fleet: Path) -> None:
@@ -174,14 +175,3 @@ def test_results_among_the_recordings_are_no_machine(fleet: Path) -> None:
     (fleet / "all" / "found" / JOURNAL).touch()
     write(fleet / "all" / "found" / "run.csv", 1.0, 1)
     assert [one.name for one in machines_in(fleet / "all")] == sorted(LEVELS)
-
-
-def test_without_out_the_same_command_goes_on(
-    fleet: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COSIM_OUT", "")
-    for _ in range(2):
-        assert call("diagnose", "all", "--quick", "--workers", "2") == 0
-    assert "where they were begun" in capsys.readouterr().err
-    assert [one.name for one in (fleet / "cosim_out").iterdir()] == ["all-1"]
-    assert os.path.exists(fleet / "cosim_out" / "all-1" / "machines.jsonl")

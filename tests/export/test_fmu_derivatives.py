@@ -1,6 +1,7 @@
 """Partial derivatives that an FMU tells: directional and adjoint ones agree with differences and with each other."""
 
 import ctypes
+from dataclasses import replace
 from functools import cache
 
 import export_models as models
@@ -13,39 +14,19 @@ from fmpy.fmi3 import FMU3Slave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pyfmi_models.card import parse_card
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import ActuatorLag, Cogging
 from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import Model
-
-RICH = """
-[mount]
-name = "rich"
-inertia = 30.0
-[friction]
-model = "lugre"
-sigma0 = 9.23e4
-sigma1 = 497.0
-sigma2 = 32.77
-Fc = 2.322
-Fs = 3.322
-Vs = 0.04129
-delta = 1.7
-[[effects]]
-effect = "cogging"
-cycles_per_rev = 20
-amplitude = 0.5
-phase = 0.3
-[[effects]]
-effect = "actuator_lag"
-time_constant_ms = 2.0
-"""
 
 
 @cache
 def rich():
     """The paper's plant with a broken exponent, a load that depends on position and a state in the drive."""
-    return parse_card(RICH, "rich.toml").plant().model()
+    card = read_card("paper_mount")
+    effects = Cogging(cycles_per_rev=20, amplitude=0.5, phase=0.3), ActuatorLag(time_constant_ms=2.0)
+    return replace(card.plant(), name="rich", friction=replace(card.friction, delta=1.7), effects=effects).model()
 
 
 # A point to differentiate at, away from the corners of the equations.

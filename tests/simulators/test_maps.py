@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,33 +13,17 @@ from cosim.api.export import export
 from cosim.api.show import show
 from cosim.models.maps import WIDTH, curve, curves_in, maps_of
 from pyfmi_models.card import read_card
+from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects.learned import LearnedTorque
 
-CARD = """[mount]
-inertia = 2
-[friction]
-model = "coulomb"
-Fc = 0.5
-sigma2 = 3
-[[effects]]
-effect = "learned"
-over = "position"
-seen = [-1.0, 1.0]
-torque = [0.0, 0.2]
-[[effects]]
-effect = "learned"
-over = "position"
-seen = [-1.0, 1.0]
-by = "speed"
-by_seen = [0.0, 2.0]
-waves = [1, 1]
-torque = [0.1, 0.0, 0.0, 0.3]
-"""
+ONE = LearnedTorque(over="position", seen=(-1.0, 1.0), torque=(0.0, 0.2))
+TWO = replace(ONE, by="speed", by_seen=(0.0, 2.0), waves=(1, 1), torque=(0.1, 0.0, 0.0, 0.3))
 
 
 @pytest.fixture
 def card(tmp_path: Path) -> Path:
     path = tmp_path / "learned.toml"
-    path.write_text(CARD)
+    path.write_text(card_text(replace(read_card("paper_mount"), effects=(ONE, TWO), controller=None)))
     return path
 
 

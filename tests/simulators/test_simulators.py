@@ -1,6 +1,7 @@
 """A card in other simulators: what files hold moves as the FMU does, and what they lose is what the table says."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,56 +13,27 @@ from cosim.api.export import export
 from cosim.simulators import FORMATS
 from cosim.simulators.measure import Held, hold
 from cosim.simulators.motion import along_default
-from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, GravityUnbalance, TorqueOffset
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.compliance import LoadSideCompliance
+from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.mount import Mount
 
-BASE = """[mount]
-inertia = 30
-torque_limit = 50
-[friction]
-model = "lugre"
-sigma0 = 9.23e4
-sigma1 = 497
-sigma2 = 32.77
-Fc = 2.322
-Fs = 3.322
-Vs = 0.04129
-"""
-EFFECTS = {
-    "loads": """[[effects]]
-effect = "cogging"
-cycles_per_rev = 240
-amplitude = 0.5
-phase = 0.4
-[[effects]]
-effect = "gravity_unbalance"
-mgl = 3
-phase = 0.7
-[[effects]]
-effect = "torque_offset"
-torque = 1.2
-[[effects]]
-effect = "cable_wrap"
-stiffness = 20
-home = 0.1
-[[effects]]
-effect = "quadratic_drag"
-coefficient = 60
-""",
-    "drive": """[[effects]]
-effect = "delay"
-delay_ms = 3
-[[effects]]
-effect = "actuator_lag"
-time_constant_ms = 4
-""",
-    "play": '[[effects]]\neffect = "backlash"\ngap_rad = 2e-3\nload_friction = 0.3\n',
-    "spring": '[[effects]]\neffect = "compliance"\nresonance_hz = 60\nencoder_share = 0.5\n',
-}
+LOADS = (
+    Cogging(cycles_per_rev=240, amplitude=0.5, phase=0.4),
+    GravityUnbalance(mgl=3.0, phase=0.7),
+    TorqueOffset(torque=1.2),
+    CableWrap(stiffness=20.0, home=0.1),
+    QuadraticDrag(coefficient=60.0),
+)
+DRIVE = Delay(delay_ms=3.0), ActuatorLag(time_constant_ms=4.0)
 
 
-def mount(effects: str = "") -> Mount:
-    return parse_card(BASE + EFFECTS.get(effects, effects), "test.toml").plant()
+def mount(*effects: Effect) -> Mount:
+    """The paper's mount with these effects."""
+    return replace(read_card("paper_mount").plant(), effects=effects)
 
 
 def held_by(simulator: str, plant: Mount) -> tuple[Held, str]:
@@ -72,12 +44,12 @@ def held_by(simulator: str, plant: Mount) -> tuple[Held, str]:
 @pytest.mark.parametrize(
     ("plant", "share"),
     [
-        pytest.param(read_card("paper_mount").plant(), 0.002, id="lugre"),
+        pytest.param(mount(), 0.002, id="lugre"),
         pytest.param(read_card("emps").plant(), 0.02, id="coulomb, linear"),
-        pytest.param(mount("loads"), 0.002, id="loads"),
-        pytest.param(mount("drive"), 0.01, id="drive"),
-        pytest.param(mount("play"), 0.02, id="play"),
-        pytest.param(mount("spring"), 0.03, id="spring"),
+        pytest.param(mount(*LOADS), 0.002, id="loads"),
+        pytest.param(mount(*DRIVE), 0.01, id="drive"),
+        pytest.param(mount(Backlash(gap_rad=2e-3, load_friction=0.3)), 0.02, id="play"),
+        pytest.param(mount(LoadSideCompliance(resonance_hz=60.0, encoder_share=0.5)), 0.03, id="spring"),
     ],
 )
 def test_what_mujoco_holds_moves_as_the_fmu(plant: Mount, share: float, tmp_path: Path) -> None:
@@ -108,22 +80,19 @@ def recorded(plant: Mount, folder: Path) -> dict[str, np.ndarray]:
 
 
 def test_the_error_on_a_recording_stands_beside_that_of_the_card(tmp_path: Path) -> None:
-    plant = mount()
-    table = recorded(plant, tmp_path)
-    card = tmp_path / "mine.toml"
-    card.write_text(BASE)
-    done = export(card, tmp_path / "out", fmi=3, mujoco=True, urdf=True, recording=table)
+    table = recorded(mount(), tmp_path)
+    done = export("paper_mount", tmp_path / "out", fmi=3, mujoco=True, urdf=True, recording=table)
     mujoco, urdf = done.held
     assert mujoco.ratio == pytest.approx(1, abs=0.05)
     assert urdf.ratio is not None
     assert urdf.ratio > 1.5, "a level and a viscous coefficient are no Stribeck curve"
     assert urdf.held_error == pytest.approx((urdf.card_error**2 + urdf.lost**2) ** 0.5, rel=0.1)
-    text = (tmp_path / "out" / "mine_simulators.txt").read_text()
+    text = (tmp_path / "out" / "paper_mount_simulators.txt").read_text()
     assert f"({urdf.ratio - 1:+.1%})" in text
 
 
 def test_a_part_that_is_not_held_is_named_with_its_torque() -> None:
-    plant = mount('[[effects]]\neffect = "cogging"\ncycles_per_rev = 240\namplitude = 0.5\nharmonics = [0.5]\n')
+    plant = mount(Cogging(cycles_per_rev=240, amplitude=0.5, harmonics=(0.5,)))
     lost = {one.part: one.lost for one in held_by("urdf", plant)[0].rows}
     assert 0.2 < lost["cogging"] < 0.5, "the RMS of a wave of 0.5 N m, less what is faster than 30 Hz"
     mujoco = {one.part: one for one in held_by("mujoco", plant)[0].rows}["cogging"]
@@ -133,7 +102,7 @@ def test_a_part_that_is_not_held_is_named_with_its_torque() -> None:
 
 def test_urdf_is_read_by_others_and_says_the_cards_numbers(tmp_path: Path) -> None:
     yourdfpy = pytest.importorskip("yourdfpy")
-    plant = parse_card(read_text("emps"), "emps").plant()
+    plant = read_card("emps").plant()
     path = tmp_path / "emps.urdf"
     path.write_text(held_by("urdf", plant)[1])
     (joint,) = yourdfpy.URDF.load(str(path), load_meshes=False).robot.joints
@@ -141,14 +110,10 @@ def test_urdf_is_read_by_others_and_says_the_cards_numbers(tmp_path: Path) -> No
     assert (float(joint.dynamics.friction), float(joint.dynamics.damping)) == (20.3935, 203.5034)
 
 
-def read_text(card: str) -> str:
-    return (Path(__file__).parents[2] / "pyfmi_models" / "cards" / f"{card}.toml").read_text()
-
-
 @pytest.mark.parametrize(("simulator", "along"), [("urdf", 9.81), ("mujoco", None)])
 def test_an_unbalance_pulls_as_the_cards_at_every_position(simulator: str, along: float | None) -> None:
     mujoco = pytest.importorskip("mujoco")
-    plant = mount('[[effects]]\neffect = "gravity_unbalance"\nmgl = 3\nphase = 0.7\n')
+    plant = mount(GravityUnbalance(mgl=3.0, phase=0.7))
     _, text = held_by(simulator, plant)
     model = mujoco.MjModel.from_xml_string(text)
     if along:
