@@ -125,6 +125,17 @@ def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(
         np.testing.assert_array_equal(one[name], other[name])
 
 
+def test_a_card_that_is_not_there_is_met_with_those_that_are(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = scenario.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("fmu"))
+    scenario.write_text(text.replace(line, 'card = "none"\npart = "plant"', 1))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    sentence = 'components.plant.card = "none": no such card; a card is a .toml file or one of: altaz_altitude,'
+    assert sentence in capsys.readouterr().err
+
+
 def test_export_writes_plant_and_controller_for_both_versions(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

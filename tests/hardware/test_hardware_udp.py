@@ -171,6 +171,14 @@ def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
     assert np.all(found["machine.counts"] == (7 if noticed == "good" else 0))
 
 
+def test_a_loop_that_is_alive_is_not_pushed_aside(tmp_path: Path) -> None:
+    slow = changed(SIMULATED, "test", watchdog_ms=5000.0)
+    with drive(slow, lockstep=False) as there, Session(scenario(), over(there.url, slow), tmp_path / "a") as one:
+        one.advance(10)
+        with pytest.raises(HardwareError, match="taken by another loop"):
+            Session(scenario(), over(there.url), tmp_path / "b")
+
+
 def test_a_drive_that_is_not_there_is_refused_in_a_sentence(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
