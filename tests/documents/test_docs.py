@@ -4,7 +4,6 @@ import importlib.util
 import re
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -29,14 +28,19 @@ def gallery() -> Any:
         sys.path.remove(str(DOCS))
 
 
-@pytest.fixture
-def site(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    spec = importlib.util.spec_from_file_location("site_conf", DOCS / "conf.py")
+def loaded(path: Path) -> Any:
+    """A file of the documentation as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec
     assert spec.loader
     spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
     return module
+
+
+@pytest.fixture
+def site(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    return loaded(DOCS / "conf.py")
 
 
 @pytest.mark.parametrize("name", sorted(TRIED))
@@ -146,16 +150,9 @@ def test_every_promise_names_tests_that_there_are() -> None:
 
 # The scripts of the documentation do what they say.
 
-SCRIPTS = Path(__file__).parents[2] / "docs" / "scripts"
 
-
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(name: str) -> Any:
+    return loaded(DOCS / "scripts" / f"{name}.py")
 
 
 def test_your_own_axis_is_diagnosed() -> None:

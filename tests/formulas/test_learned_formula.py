@@ -50,33 +50,39 @@ def blocks(many: int) -> Blocks:
     return Blocks(tuple(np.array_split(np.arange(many), 20)), np.repeat([0, 1], 10))
 
 
-def made(effect, law, seed: int) -> tuple[Partial, Array]:
+def made(effect, law, seed: int, begins: float = -0.8) -> tuple[Partial, Array, Array]:
     """Rows of a term beside a base with an unknown level and slope, and the value of the law there."""
     rng, many = np.random.default_rng(seed), 4000
-    x, y = rng.uniform(-0.8, 1.0, many), rng.uniform(10.0, 25.0, many)
+    x, y = begins + rng.uniform(0, 1.8, many), rng.uniform(10.0, 25.0, many)
     sign = np.sign(rng.standard_normal(many))
     two = isinstance(effect, LearnedFriction)
     unit, value = 2.0 * sign if two else np.ones(many), law(x, y) if two else law(x)
-    left = unit * value + 0.1 * sign + NOISE * rng.standard_normal(many)
+    noise = NOISE * rng.standard_normal(many)
+    left = unit * value + 0.1 * sign + noise
     part = Partial(effect, x, y if two else None, left, unit, np.ones(many), blocks(many))
-    return part, np.column_stack([sign, rng.standard_normal(many)])
+    return part, np.column_stack([sign, rng.standard_normal(many)]), noise
+
+
+def case_of(effect, law, begins: float = -0.8) -> Case:
+    """A term that was learned of some rows, and others that judge what is proposed."""
+    (part, slopes, _), (there, own, noise) = (made(effect, law, seed, begins) for seed in (1, 2))
+    return Case(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
 
 
 @cache
 def case(name: str) -> Case:
-    effect, law = (WARM, lambda x, y: 0.05 * (y - 18) * np.exp(-((x / 0.2) ** 2))) if name == "warm" else (
-        POSITION, saw if name == "saw" else LAWS[name],
-    )  # fmt: skip
-    (part, slopes), (there, own) = made(effect, law, 1), made(effect, law, 2)
-    noise = there.left - there.unit * (law(there.over, there.by) if name == "warm" else law(there.over))
-    unseen = Unseen(Rows.of(there, own), there.blocks, noise - 0.1 * own[:, 0], there.left)
-    return Case(part, Rows.of(part, slopes), unseen)
+    if name == "warm":
+        return case_of(WARM, lambda x, y: 0.05 * (y - 18) * np.exp(-((x / 0.2) ** 2)))
+    return case_of(POSITION, saw if name == "saw" else LAWS[name])
+
+
+def formula_of(now: Case) -> Formula | None:
+    return proposed(now.part, now.train, now.unseen)
 
 
 @cache
 def found(name: str) -> Formula | None:
-    now = case(name)
-    return proposed(now.part, now.train, now.unseen)
+    return formula_of(case(name))
 
 
 def forms(formula: Formula) -> set[str]:
@@ -106,10 +112,7 @@ def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> Non
 
 def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
     """0.05 (y - 18) (x - 0.3), which three coefficients hold and no product of two forms does."""
-    (part, slopes), (there, own) = (made(WARM, lambda x, y: 0.05 * (y - 18) * (x - 0.3), seed) for seed in (1, 2))
-    noise = there.left - there.unit * 0.05 * (there.by - 18) * (there.over - 0.3)
-    unseen = Unseen(Rows.of(there, own), there.blocks, noise - 0.1 * own[:, 0], there.left)
-    formula = proposed(part, Rows.of(part, slopes), unseen)
+    formula = formula_of(case_of(WARM, lambda x, y: 0.05 * (y - 18) * (x - 0.3)))
     assert formula is not None
     assert forms(formula) == {"line"}
     k1, k2, k3 = formula.coefficients  # of x, x y, y
@@ -117,9 +120,7 @@ def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
 
 
 def test_a_sine_of_many_periods_is_found() -> None:
-    (part, slopes), (there, own) = (made(POSITION, lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14), k) for k in (1, 2))
-    noise = there.left - 0.4 * np.sin(2 * np.pi * there.over / 0.14)
-    formula = proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
+    formula = formula_of(case_of(POSITION, lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14)))
     assert formula is not None
     assert formula.inner[1] == pytest.approx(0.14, rel=0.01)
 
@@ -127,11 +128,7 @@ def test_a_sine_of_many_periods_is_found() -> None:
 def test_what_fades_after_a_reversal_has_its_time() -> None:
     """0.7 exp(-t / 0.3 s): the memory's own form, whatever else would fit as well."""
     fading = LearnedAfterReversal(times=(0.1, 0.4), level_change=(0.1, 0.1))
-    law = lambda x: 0.7 * np.exp(-(x + 0.8) / 0.3)  # noqa: E731
-    both = [made(fading, law, seed) for seed in (1, 2)]
-    (part, slopes), (there, own) = ((replace(one, over=one.over + 0.8), rows) for one, rows in both)
-    noise = there.left - 0.7 * np.exp(-there.over / 0.3)
-    formula = proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
+    formula = formula_of(case_of(fading, lambda x: 0.7 * np.exp(-x / 0.3), begins=0.0))
     assert formula is not None
     said = Spelled(fading, formula, False).as_json()
     assert said["equation"] == "friction × (1 + f), f = k1 exp(−t/fade)"

@@ -108,15 +108,6 @@ def test_every_family_stays_finite_in_time_and_in_limits_however_absurd_these_ar
             assert motion.seconds <= 10.0 + 1e-6
 
 
-@pytest.mark.parametrize("hertz", [0.25, 1.0, 5.0])
-def test_the_frequency_of_a_tone_is_its_own_and_of_two_the_higher_one(hertz: float) -> None:
-    t = np.arange(0, 12, 1e-3)
-    w = 2 * np.pi * np.array([[0.25], [hertz]])
-    sizes = np.array([[1.0], [0.3]])
-    v, a = (sizes * np.cos(w * t)).sum(0), (-sizes * w * np.sin(w * t)).sum(0)
-    assert frequency_of(v, a, 1e-3) == pytest.approx(hertz, rel=0.1)
-
-
 @pytest.mark.parametrize(
     ("tones", "hertz"),
     [
