@@ -29,41 +29,6 @@ EACH = pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__n
 WEIGHT = GravityUnbalance(mgl=2.0)
 """On the axis everywhere, so that what depends on a load has one."""
 CONSERVATIVE = ("cogging", "gravity_unbalance", "torque_offset", "cable_wrap")
-NEUTRAL = {
-    "FrictionAsymmetry": {"level_asymmetry": 0.0, "viscous_asymmetry": 0.0},
-    "Cogging": {"amplitude": 0.0},
-    "PeriodicFriction": {"relative_amplitude": 0.0},
-    "LocalFriction": {"relative_amplitude": 0.0},
-    "GravityUnbalance": {"mgl": 0.0},
-    "TorqueOffset": {"torque": 0.0},
-    "ThermalViscosity": {"viscous_per_degC": 0.0, "coulomb_per_degC": 0.0},
-    "WarmingViscosity": {"viscous_per_degC": 0.0},
-    "RubbedViscosity": {"viscous_per_degC": 0.0},
-    "DwellBreakaway": {"torque_per_efold": 0.0},
-    "EncoderEccentricity": {"amplitude_rad": 0.0},
-    "QuadraticDrag": {"coefficient": 0.0},
-    "CableWrap": {"stiffness": 0.0},
-    "InertiaVariation": {"relative_amplitude": 0.0},
-    "LoadDependentFriction": {"coulomb_per_Nm": 0.0},
-    "GearLoadFriction": {"coulomb_per_Nm": 0.0},
-    "GearFriction": {"driving": 0.0, "driven": 0.0},
-    "BoucWen": {"torque": 0.0},
-    "TorqueDroop": {"droop": 0.0},
-    "WarmTorqueDroop": {"droop": 0.0},
-    "RoughSpot": {"forward": 0.0, "backward": 0.0},
-    "TorqueSaturation": {"slope": 1.0},
-    "PeriodicDisturbance": {"amplitude": 0.0},
-    "ClockSkew": {"drift_ppm": 0.0, "offset_ms": 0.0},
-    "ConcaveViscous": {"exponent": 1.0},
-    "LearnedTorque": {"share": 0.0},
-    "LearnedFriction": {"share": 0.0},
-    "LearnedViscous": {"share": 0.0},
-    "LearnedDrive": {"share": 0.0},
-    "LearnedGain": {"share": 0.0},
-    "LearnedHysteresis": {"share": 0.0},
-    "LearnedAfterReversal": {"share": 0.0},
-}
-"""Numbers that make an effect none; the others have no such numbers."""
 
 
 def points(model: Model, count: int, seed: int = 0) -> np.ndarray:
@@ -136,20 +101,8 @@ def _all(model: Model):
     return (*model.states, *model.inputs, *model.parameters)
 
 
-@pytest.mark.parametrize("name", NEUTRAL)
-def test_an_effect_of_no_size_is_none(name: str) -> None:
-    effect = replace(next(one for one in EXAMPLES if type(one).__name__ == name), **NEUTRAL[name])
-    with_it, without = mount(effect, WEIGHT).model(), mount(WEIGHT).model()
-    for q, v, tau in ((0.3, 0.2, 9.0), (-1.0, -0.01, -3.0), (0.0, 0.0, 1.0)):
-        values = {"position": q, "speed": v, "tau": tau}
-        expected = evaluate(without, 5.0, **values)
-        found = evaluate(with_it, 5.0, **values)
-        assert {key: found[key] for key in expected} == pytest.approx(expected, rel=1e-12, abs=1e-12)
-        assert all(found[one] == found["q"] for one in ("q_true", "q_recorded") if one in found)
-
-
 def test_every_form_is_in_the_catalogue_and_has_an_example() -> None:
-    assert set(NEUTRAL) <= set(NUMBERS) <= {form.__name__ for form in FORMS}
+    assert set(NUMBERS) <= {form.__name__ for form in FORMS}
     assert {type(one) for one in EXAMPLES} == {form for forms in CATALOGUE.values() for form in forms}
 
 

@@ -1,6 +1,5 @@
 """Effects act where they say, resist, and are written with the ids and words of the contract."""
 
-from dataclasses import MISSING, fields
 from typing import Any
 
 import casadi as ca
@@ -27,32 +26,6 @@ from pyfmi_models.effects import (
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
-CONTRACT = {
-    "friction_asymmetry": {"level_asymmetry", "viscous_asymmetry"},
-    "stribeck": {"Fs", "Vs", "delta"},
-    "presliding": {"sigma0"},
-    "cogging": {"cycles_per_rev", "amplitude", "phase", "harmonics"},
-    "position_friction": {"cycles_per_rev", "q_center", "relative_amplitude", "width"},
-    "gravity_unbalance": {"mgl", "phase"},
-    "torque_offset": {"torque"},
-    "constant_force": {"force"},
-    "axis_coupling": {"inertia", "damping", "weight", "phase", "follows", "neighbour"},
-    "thermal_viscosity": {"viscous_per_degC", "coulomb_per_degC"},
-    "dwell_breakaway": {"torque_per_efold"},
-    "compliance": {"antiresonance_hz", "resonance_hz"},
-    "actuator_lag": {"time_constant_ms"},
-    "delay": {"delay_ms"},
-    "friction_wander": {"std"},
-    "backlash": {"gap_rad"},
-    "encoder_eccentricity": {"cycles_per_rev", "amplitude_rad"},
-    "quadratic_drag": {"coefficient"},
-    "cable_wrap": {"stiffness", "home"},
-    "inertia_variation": {"relative_amplitude"},
-    "load_dependent_friction": {"coulomb_per_Nm"},
-    "torque_saturation": {"knee_torque"},
-    "periodic_disturbance": {"frequency_hz", "amplitude"},
-    "clock_skew": {"drift_ppm", "offset_ms"},
-}
 MULTIPLIED = ("friction_asymmetry", "stribeck", "position_friction", "thermal_viscosity")
 MULTIPLIERS = [one for one in EXAMPLES if one.id in MULTIPLIED and not one.states()]
 KINDS = (DriveEffect, FrictionEffect, LoadEffect, InertiaEffect, Coupling, SensorEffect, ClockEffect)
@@ -82,17 +55,6 @@ def state_space(drive: DriveEffect) -> tuple[np.ndarray, ...]:
 def frequency_response(drive: DriveEffect, omega: np.ndarray) -> np.ndarray:
     A, B, C, D = state_space(drive)
     return np.array([(C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) + D).item() for w in omega])
-
-
-def test_ids_and_parameter_names_are_those_of_the_contract() -> None:
-    """Further parameters are extensions; all but those of a form that a card asks for by them have defaults."""
-    found = {key: {item.name for form in forms for item in fields(form)} for key, forms in CATALOGUE.items()}
-    assert set(found) >= set(CONTRACT)
-    for key in CONTRACT:
-        forms = CATALOGUE[key]
-        assert CONTRACT[key] <= found[key]
-        required = {item.name for item in fields(forms[0]) if item.default is MISSING}
-        assert required <= CONTRACT[key], f"{key}: a card as the contract writes it would lack {required}"
 
 
 @pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)

@@ -215,8 +215,3 @@ def test_a_model_that_is_not_sampled_or_lacks_the_encoder_is_refused() -> None:
         firmware(plant, host_target, encoder="q", **given)
     with pytest.raises(ExportError, match='has no input "angle"; there are: q, q_d, v_d, a_d'):
         firmware(controller, host_target, encoder="angle", **given)
-
-
-def test_equal_cards_give_equal_projects() -> None:
-    first, second = (tools.project_of(paper(), "host").files for _ in range(2))
-    assert first == second

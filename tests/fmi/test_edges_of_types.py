@@ -9,7 +9,7 @@ from mirror_fmu import named
 from simulating import pair, simulate
 
 from cosim.fmi.component import Port
-from cosim.fmi.types import limits, refusal
+from cosim.fmi.types import refusal
 from cosim.fmi.values import prepared
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.conversions import check_wire
@@ -44,11 +44,6 @@ def fed(mirror: dict[int, Path], kind: str, values: list[float], output: str = "
         ticks=len(values),
         signals={"s": np.array(values, dtype=float)},
     ).recording["y"]
-
-
-@pytest.mark.parametrize("kind", EDGES)
-def test_a_type_has_the_limits_of_the_standard(kind: str) -> None:
-    assert limits(kind) == EDGES[kind]
 
 
 @pytest.mark.parametrize("kind", EDGES)

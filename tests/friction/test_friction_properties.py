@@ -15,7 +15,7 @@ from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import LAWS, FrictionLaw, LuGre, MaxwellSlip, Stribeck
 from pyfmi_models.friction.lugre_passive import FASTEST, PassiveLuGre
-from pyfmi_models.model import Pair, parameters_of
+from pyfmi_models.model import Pair
 
 
 def laws(table: dict[str, FrictionLaw]) -> Any:
@@ -171,14 +171,6 @@ def test_every_shape_of_the_stribeck_curve_has_finite_derivatives(law: FrictionL
         assert all(np.all(np.isfinite(values)) for values in this.slopes(name, this.start(0.5), v)), (name, v)
 
 
-@laws(EXAMPLES)
-def test_every_parameter_has_a_unit_a_meaning_and_bounds_around_its_number(law: FrictionLaw) -> None:
-    for variable in parameters_of(law):
-        assert variable.unit
-        assert variable.description
-        assert variable.low <= variable.start <= variable.high
-
-
 # Passivity: no motion takes more energy out of a contact than it put in; with LuGre's shipped numbers one does.
 
 LUGRE, SLIP, FADING = EXAMPLES["lugre"], EXAMPLES["maxwell_slip"], EXAMPLES["lugre_passive"]
@@ -238,14 +230,6 @@ def test_dashes_between_creeps_take_energy_out_of_a_law_that_is_not_passive(law:
 
 
 @pytest.mark.parametrize("law", PASSIVE.values(), ids=PASSIVE.keys())
-@pytest.mark.parametrize("speed", [0.003, 0.04, 0.3, 3.0, 30.0])
-def test_the_same_motion_costs_energy_where_the_law_is_passive(law: FrictionLaw, speed: float) -> None:
-    gained, moved = wasted(law, *fast_and_slow(speed, 5))
-    assert gained > 1e-3 * moved
-    assert law.broken_passivity() == ""
-
-
-@pytest.mark.parametrize("law", PASSIVE.values(), ids=PASSIVE.keys())
 @given(motion=st.lists(st.tuples(st.floats(-9, 1.5), st.floats(-2, 1), st.booleans()), min_size=1, max_size=30))
 @settings(max_examples=60, deadline=None)
 def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
@@ -256,6 +240,7 @@ def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
     seconds = np.array([10**share * BEND for _, share, _ in motion]) / np.abs(speeds)
     gained, moved = wasted(law, speeds, seconds, 20)
     assert gained >= -1e-9 * moved
+    assert law.broken_passivity() == ""
 
 
 @given(share=st.floats(-1, 1), size=st.floats(-9, 3), stretch=st.floats(-2, 1))
