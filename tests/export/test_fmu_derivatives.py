@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from effect_examples import EXAMPLES, mount, simulate, slopes
 from export_models import Driver
-from fmpy import extract, read_model_description
-from fmpy.fmi3 import FMU3Slave
+from fmpy import read_model_description
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -173,34 +172,11 @@ def test_derivatives_take_and_give_as_many_numbers_as_there_are_variables(which)
     assert ask(driver, which, unknowns, knowns, [1.0] * many)[0] == "ok"
 
 
-def test_fmpy_reads_the_flag_and_gets_the_adjoint(tmp_path):
-    path = export_fmu(models.oscillator(), tmp_path / "oscillator.fmu")
-    description = read_model_description(str(path))
-    assert (
-        description.modelExchange.providesAdjointDerivatives,
-        description.coSimulation.providesAdjointDerivatives,
-    ) == (
-        True,
-        True,
-    )
-    references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=extract(str(path), str(tmp_path / "unzipped")),
-                    modelIdentifier="oscillator", instanceName="it")  # fmt: skip
-    fmu.instantiate()
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    unknowns = [references["der(velocity)"], references["direct"]]
-    knowns = [references[name] for name in ("position", "force", "stiffness")]
-    # der(velocity) = -stiffness position + sin(t) / 2 + force, direct = force + stiffness, at position = stiffness = 1
-    assert fmu.getAdjointDerivative(unknowns, knowns, [2.0, 3.0], nSensitivity=3) == [-2.0, 5.0, 1.0]
-    fmu.terminate()
-    fmu.freeInstance()
-
-
-def test_the_controller_announces_no_derivatives(tmp_path):
-    description = read_model_description(str(export_fmu(models.controller(), tmp_path / "pd.fmu")))
-    assert not description.coSimulation.providesAdjointDerivatives
-    assert not description.coSimulation.providesDirectionalDerivative
+@pytest.mark.parametrize(("make", "promised"), [(models.oscillator, True), (models.controller, False)])
+def test_who_reads_a_description_is_told_whether_there_are_derivatives(make, promised, tmp_path):
+    description = read_model_description(str(export_fmu(make(), tmp_path / "one.fmu")))
+    for kind in filter(None, (description.modelExchange, description.coSimulation)):
+        assert (kind.providesAdjointDerivatives, kind.providesDirectionalDerivative) == (promised, promised)
 
 
 # Plants with every effect of the catalogue, as FMUs: their steps are the equations, solved.
