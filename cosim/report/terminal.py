@@ -1,11 +1,8 @@
 """The diagnosis on a terminal: plain text, 80 columns, colour never needed."""
 
-import os
-import sys
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TextIO
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.decide.calibration import LIKELY
@@ -42,18 +39,17 @@ ORDER = 10
 """Columns of what to do, before the text."""
 
 
-def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -> str:
+def summary(diagnosis: Diagnosis, out: Path | None = None) -> str:
     """Return the whole answer as lines of at most 80 columns: the verdict, what to do, which file to open, the rest.
 
     Args:
         diagnosis: the answer.
-        bold: mark the verdict with an ANSI code.
         out: folder of its files, where they were written.
     """
     scales = Scales.of(diagnosis)
     title = printable(_title(diagnosis))
     parts = [
-        [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
+        textwrap.wrap(title, WIDTH),
         _doubts(diagnosis),
         [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
         _files(diagnosis, scales, out),
@@ -108,19 +104,6 @@ def _files(diagnosis: Diagnosis, scales: Scales, out: Path | None) -> list[str]:
     proven, files = proven_range(diagnosis, scales), delivered(diagnosis)
     suffix = f" (proven {proven})" if proven else ""
     return lines + (_ordered("Use", files[0] + suffix) if files else [])
-
-
-def print_summary(diagnosis: Diagnosis, stream: TextIO | None = None) -> None:
-    """Print the summary; bold only on a terminal that wants it (NO_COLOR, TERM=dumb)."""
-    out = stream or sys.stdout
-    text = summary(diagnosis, bold=styled(out))
-    encoding = getattr(out, "encoding", None) or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding), file=out)
-
-
-def styled(stream: TextIO) -> bool:
-    """Return whether a stream is a terminal that takes ANSI codes."""
-    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 def _title(diagnosis: Diagnosis) -> str:

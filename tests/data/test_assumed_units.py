@@ -92,19 +92,6 @@ def test_a_file_without_names_and_without_a_torque_is_shown_with_what_was_named(
     assert "tau=#2" in seen.undecided[0]  # never the column that was named
 
 
-def test_a_file_without_names_that_has_too_few_columns_is_a_table(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "", T, Q)
-    seen = preview(path, {"columns": {"t": "#1", "q": "#2"}})
-    assert "has no column tau" in seen.refused
-    np.testing.assert_allclose(seen.recording["q"], Q, atol=1e-6)
-
-
-def test_a_torque_without_a_motion_is_shown_as_a_table(tmp_path: Path) -> None:
-    seen = preview(written(tmp_path / "run.csv", "timestamp_s,torque_V", T, TAU))
-    assert "has no column q or v" in seen.refused
-    assert "torque_V" in seen.recording
-
-
 def test_a_torque_in_nm_in_small_letters_is_in_newton_metres(tmp_path: Path) -> None:
     seen = Recording.read(written(tmp_path / "run.csv", "time_s,torque_nm,position_rad", T, TAU, Q))
     np.testing.assert_allclose(seen["tau"], TAU, atol=1e-6)

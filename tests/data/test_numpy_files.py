@@ -23,14 +23,6 @@ Q = np.sin(3 * T)
 TAU = np.cos(5 * T)
 
 
-def test_vectors_of_an_archive_are_columns(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", t=T, q=Q, tau=TAU, gain=np.array(3.0))
-    seen = Recording.read(tmp_path / "run.npz")
-    np.testing.assert_array_equal(seen["q"], Q)
-    np.testing.assert_array_equal(seen["tau"], TAU)
-    assert not seen.notes
-
-
 @pytest.mark.parametrize("by_columns", [False, True])
 def test_a_table_of_joints_is_asked_for_the_joint(tmp_path: Path, by_columns: bool) -> None:
     q = np.stack([Q, 2 * Q, 3 * Q], axis=1)
@@ -59,13 +51,6 @@ def test_a_matrix_without_names_is_asked_for_them(tmp_path: Path) -> None:
         Recording.read(tmp_path / "run.npy")
     seen = Recording.read(tmp_path / "run.npy", {"t": "#1", "tau": "#2", "q": "#3"})
     np.testing.assert_array_equal(seen["q"], Q)
-
-
-def test_arrays_of_another_length_are_left_out_with_a_note(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", t=T, q=Q, tau=TAU, temperatures=np.arange(7.0))
-    assert preview(tmp_path / "run.npz").recording.notes == (
-        "run: arrays of other lengths were left out: temperatures (7).",
-    )
 
 
 def test_a_note_on_arrays_does_not_forbid_a_period(tmp_path: Path) -> None:

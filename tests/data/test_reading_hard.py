@@ -76,13 +76,6 @@ def test_a_million_columns_are_refused_before_they_are_parsed(tmp_path: Path) ->
         Recording.read(path)
 
 
-def test_parquet_of_too_many_columns_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "COLUMNS", 50)
-    parquet.write_table(pa.table({f"c{number}": [1.0] for number in range(60)}), tmp_path / "run.parquet")
-    with pytest.raises(RecordingError, match=r"has 60 columns; a recording has at most 50\."):
-        Recording.read(tmp_path / "run.parquet")
-
-
 def test_a_bomb_of_a_gigabyte_is_refused_early(tmp_path: Path) -> None:
     four_megabytes = gzip.compress(b"0.001,1,2\n" * 400_000)
     (tmp_path / "run.csv.gz").write_bytes(gzip.compress(b"t,tau,q\n") + four_megabytes * 250)

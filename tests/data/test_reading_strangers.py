@@ -1,6 +1,5 @@
 """Files of machines that were not seen when the reader was written: read rightly, or asked; nothing taken silently."""
 
-import re
 from math import pi
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from tables import written
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
-from cosim.data.text.names import spelled, split_unit
+from cosim.data.text.names import spelled
 from cosim.data.text.table import grouped
 from cosim.reading import read_recordings
 from cosim.support.errors import InputError, ManyRecordingsError, RecordingError, UndecidedError
@@ -21,14 +20,6 @@ T = 0.005 * np.arange(ROWS)
 Q = np.sin(3 * T)
 TAU = 1.5 * np.cos(3 * T)
 DEG = np.degrees(1)
-
-
-def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_ours(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "Time (s),Torque (stone-ell),Position (deg)", T, TAU, Q * DEG)
-    sentence = '"stone-ell" of column "Torque (stone-ell)" is no unit known here; say which it is in, for example '
-    with pytest.raises(UndecidedError, match=re.escape(f"{sentence}--units tau=mN.m.")):
-        Recording.read(path)
-    np.testing.assert_allclose(Recording.read(path, units={"tau": "mN.m"})["tau"], 1e-3 * TAU, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -85,20 +76,6 @@ def test_torques_of_other_countries_are_known(text: str, newton_metres: float) -
 )
 def test_angles_as_other_tools_write_them_are_known(text: str, radians: float) -> None:
     assert unit(spelled(text)).factor == pytest.approx(radians, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("header", "name", "text"),
-    [
-        ("in s", "time", "s"),
-        ("[ms]", "time", "ms"),
-        ("X1 Lageistwert/mm", "X1 Lageistwert", "mm"),
-        ("/axis/position/rad", "/axis/position/rad", ""),
-        ("[V]", "[V]", "V"),
-    ],
-)
-def test_units_stand_alone_or_behind_a_stroke(header: str, name: str, text: str) -> None:
-    assert split_unit(header) == (name, text)
 
 
 def test_the_last_part_of_a_path_tells_what_it_is(tmp_path: Path) -> None:
@@ -183,11 +160,6 @@ def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
     path.write_text("\n".join(f";{t:.4f};{tau:.6f};{q:.6f}" for t, tau, q in zip(T, TAU, Q, strict=True)))
     with pytest.raises(UndecidedError, match=r"--columns t=#2 tau=#3 q=#4\."):
         Recording.read(path)
-
-
-def test_a_comment_column_of_labview_may_be_missing_below_its_name(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.lvm", "X_Value\tTorque\tAngle\tComment", T, TAU, Q, sep="\t")
-    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
 
 
 @pytest.mark.parametrize("word", ["Y_Unit_Label", "Vertical Units", "unit", "Einheit"])

@@ -96,11 +96,7 @@ def test_a_table_that_begins_again_in_rows_half_empty_is_many_recordings(tmp_pat
     ("header", "options", "question"),
     [
         ("idx,ts,motorU,rpm", {}, '"ts" steps by 11, which is 0.09091 Hz in s or 90.91 Hz in ms'),
-        (
-            "x,step,motorU,rpm",
-            {"columns": {"t": "step"}},
-            '"step" steps by 11; say what one is, for example --units t=ms',
-        ),
+        ("x,step,motorU,rpm", {"columns": {"t": "step"}}, '"step" steps by 11; say what one is, for example --units'),
     ],
 )
 def test_a_time_that_counts_is_asked_for_in_a_table_that_is_no_axis_too(

@@ -13,7 +13,6 @@ from cosim.data.recording import Recording
 from cosim.data.set_points import PIECE
 from cosim.data.signals import (
     Chirp,
-    Constant,
     Generator,
     Multisine,
     Noise,
@@ -154,12 +153,6 @@ def test_a_recording_that_cannot_be_replayed_is_named(tmp_path: Path) -> None:
         Recorded(kind="recorded", file=path, column="tau").stream(STEP)
     with pytest.raises(RecordingError, match="does not exist"):
         Recorded(kind="recorded", file=tmp_path / "none.csv", column="tau").stream(STEP)
-
-
-def test_a_constant_is_constant() -> None:
-    constant = Constant(kind="constant", value=2.5, unit="N.m")
-    np.testing.assert_array_equal(values(constant, 3), [[2.5] * 3])
-    assert constant.outputs == {"value": "N.m"}
 
 
 @pytest.mark.parametrize(

@@ -170,10 +170,7 @@ ASKED = {
         'has names that do not fit its 3 columns, "time motor torque position"; say which is which, for example '
         "--columns t=#1 tau=#2 q=#3. First rows as read: #1 0, 0.002, 0.004; #2 1.381",
     ),
-    "names that are fewer than columns": (
-        "t,tau,q\n" + rows(*S, 7 * QL),
-        'has names that do not fit its 4 columns, "t,tau,q"; say which is which',
-    ),
+    "names that are fewer than columns": ("t,tau,q\n" + rows(*S, 7 * QL), "has names that do not fit its 4 columns"),
     "a comma in the last column alone": (
         "t,tau,q\n" + rows(*S[:2], [f"{x:.3f}".replace(".", ",") for x in QL]),
         'has names that do not fit its 4 columns, "t,tau,q"; say which is which',

@@ -21,7 +21,7 @@ from cosim.system.scenario import read_scenario
 from cosim.system.wire import Record
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.correction import correction, left_out
-from pyfmi_models.effects import ActuatorLag, Cogging, FrictionAsymmetry
+from pyfmi_models.effects import Cogging
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.known_load import KnownLoad
 from pyfmi_models.export import export_fmu
@@ -116,21 +116,6 @@ def test_an_fmu_that_is_asked_wrongly_is_refused(
     box = BlackBox(team.box.fmu, {ours: Alias(name) for ours, name in names.items()})
     with pytest.raises(error, match=sentence):
         as_base(box, team.recordings[:1], team.recordings[1:], team.rough)
-
-
-def test_a_plant_behind_a_correction_does_what_the_better_mount_does(tmp_path: Path) -> None:
-    effects = (ActuatorLag(time_constant_ms=1.0), RIPPLE, FrictionAsymmetry(level_asymmetry=0.3, viscous_asymmetry=0.1))
-    plant = CARD.plant()
-    better = replace(plant, axis=replace(plant.axis, inertia=33.0), effects=effects)
-    models = {"p": plant.model(), "better": better.model(), "c": correction(plant, better)}
-    models |= {"k": CARD.controller_model()}
-    fmus = {name: export_fmu(model, tmp_path / f"{name}.fmu", fmi=3) for name, model in models.items()}
-    plain, wanted = (recorded(fmus[name], fmus["k"], 3) for name in ("p", "better"))
-    through = [("k.tau", "c.tau"), ("c.corrected", "p.tau"), ("p.q", "c.q"), ("p.v", "c.v"), *WIRES[1:]]
-    found = recorded(fmus["p"], fmus["k"], 3, through, c=fmus["c"])
-    for column, share in (("tau", 0.02), ("q", 0.05)):
-        off, before = (np.std((one[column] - wanted[column])[1000:]) for one in (found, plain))
-        assert off < share * before, column
 
 
 @pytest.mark.parametrize("is_known", [(True, False), (False, True), (True, True)])

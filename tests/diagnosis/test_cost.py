@@ -14,7 +14,6 @@ from cosim.diagnosis.measure.regression import kernel
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import prepare
-from cosim_studies.demo import in_own_process
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.tool import given
 from pyfmi_models.card import read_card
@@ -66,12 +65,6 @@ def test_equal_models_have_their_loop_closed_once(tmp_path: Path) -> None:
         errors = loops.errors()
         assert loops.runs("nominal") is loops.runs("same")
     assert errors["nominal"] == errors["same"] != errors["other"]
-
-
-def test_another_process_answers_beside_this_one() -> None:
-    card = read_card("paper_mount")
-    with in_own_process(repr, card) as said:
-        assert said.result() == repr(card)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator")

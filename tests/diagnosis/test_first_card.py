@@ -110,16 +110,6 @@ def test_units_say_whether_an_axis_turns_and_without_them_it_is_said() -> None:
         cosim.card(table(7), motion="sideways")
 
 
-@pytest.mark.parametrize("command", [["card", "run.csv"], ["diagnose", "run.csv", "run.csv"]])
-def test_a_kind_of_axis_that_is_none_is_one_sentence(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    table(1, seconds=5.0).to_csv("run.csv", index=False)
-    assert call(*command, "--motion", "sideways") == 2
-    assert 'motion "sideways" is no kind of axis; there are: rotary, linear.' in capsys.readouterr().err
-
-
 def test_of_several_recordings_the_last_is_kept_and_a_single_one_is_cut() -> None:
     several = [cosim.read(table(seed), name=f"run {seed}") for seed in (1, 2, 3)]
     train, held, said = split(several)

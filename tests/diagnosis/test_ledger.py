@@ -10,7 +10,7 @@ from commands import call
 
 import cosim
 from cosim.diagnosis.answer.ledger import Gain, Ledger, Rule, Trial, at_least, error_of_sum, until_refused
-from cosim.diagnosis.answer.why import BASE, decisive, ranked, reasons, sentence
+from cosim.diagnosis.answer.why import BASE, decisive, ranked
 from cosim_studies.proof.generator import make_case, write_given
 
 
@@ -64,13 +64,6 @@ def test_every_trial_that_is_not_taken_names_the_rule_that_refuses_it(diagnosed:
 def test_what_loses_in_training_is_not_scored_on_held_out_recordings(diagnosed: tuple[Path, Any]) -> None:
     for row in rows(diagnosed[0]):
         assert (row["nats_heldout"] is None) == (row["nats_train"] <= 0)
-
-
-def test_the_ledger_is_a_data_frame(diagnosed: tuple[Path, Any]) -> None:
-    table = diagnosed[1].ledger
-    assert isinstance(table, pd.DataFrame)
-    assert len(table) == len(rows(diagnosed[0]))
-    assert {"effects", "nats_train", "nats_heldout", "refused_by"} <= set(table.columns)
 
 
 def test_why_ranks_structures_and_gives_a_sentence_for_every_effect(
@@ -165,13 +158,3 @@ def test_weights_of_the_ranked_structures_add_up_to_one_and_the_base_is_among_th
 
 def test_the_standard_error_of_a_sum_grows_with_the_root_of_its_blocks() -> None:
     assert error_of_sum(pd.Series([1.0, -1.0] * 50).to_numpy()) == pytest.approx(10.05, abs=0.01)
-
-
-def test_a_refusal_says_value_and_limit() -> None:
-    assert sentence(at_least("evidence", 3.21, 15.0, "nats")) == "evidence: 3.21 nats, limit 15"
-    assert sentence(Rule("the set point demands it", False)) == "the rule 'the set point demands it' is not met"
-
-
-def test_an_effect_that_was_never_fitted_is_said_to_have_had_no_evidence() -> None:
-    document = {"verdict": [], "effects": [{"effect": "delay", "answer": "not_seen", "probability": 0.0}]}
-    assert dict(reasons(document, []))["delay"].startswith("not detected: not fitted")

@@ -1,7 +1,6 @@
 """What proves a diagnosis beside its torque residual: the closed loop, a black box, the test for bias by the loop."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,24 +111,3 @@ def test_a_black_box_learns_what_is_smooth_and_leaves_the_noise() -> None:
     learnt = black_box_rms([traced("a", False, 1, 0.1), traced("b", False, 2, 0.1), traced("c", True, 3, 0.1)])
     without = float(np.sqrt(np.mean(traced("c", True, 3, 0.1).missing ** 2)))
     assert 0.1 < learnt < 0.3 * without
-
-
-def test_the_improved_files_say_all_three(tmp_path: Path, case: tuple[Card, list[Recording], Recording, float]) -> None:
-    import json
-
-    from cosim.delivery.deliver import deliver
-    from cosim.diagnosis.diagnose import diagnose
-
-    card, train, held, _ = case
-    outcome = diagnose(train, [held], card)
-    with Loops(card, [held]) as loops:
-        deliver(outcome, train, [held], card, tmp_path, "a test", loops)
-    told = json.loads((tmp_path / "diagnosis.json").read_text("utf-8"))
-    position = told["heldout"]["position"]
-    assert position["after"] < position["before"] <= 1.05 * position["nominal"]
-    assert told["heldout"]["black_box_rms"] > 0
-    assert set(told["loop_bias"]) == {"biased", "p_value", "moved"}
-    page = (tmp_path / "report.html").read_text("utf-8")
-    assert "Position, closed loop" in page
-    assert "black box" in page
-    assert "set point" in page

@@ -49,10 +49,7 @@ CLOSED = {
 @pytest.mark.parametrize(
     ("parameters", "sentence"),
     [
-        (
-            {"fail_at": 0.5},
-            'spring returned an error at tick 10 (0.5 s); it said "the shaft broke"; its last inputs: a = ',
-        ),
+        ({"fail_at": 0.5}, 'spring returned an error at tick 10 (0.5 s); it said "the shaft broke"; its last inputs'),
         ({"nan_at": 0.5}, "spring gave an output that is not a finite number at tick 10 (0.5 s)"),
     ],
 )
@@ -223,24 +220,12 @@ def test_components_that_do_not_agree_are_named(direct: Path, compiled: bool) ->
 
 MISTAKES: list[tuple[Any, Mapping[str, int], str]] = [
     (GaussSeidel(kind="gauss-seidel", order=("mass",)), {}, "it must name each component once: mass, spring."),
-    (
-        Iterated(kind="iterated", components=("mas",)),
-        {},
-        'algorithm.components names "mas", which is no component; components are: mass, spring.',
-    ),
+    (Iterated(kind="iterated", components=("mas",)), {}, 'algorithm.components names "mas", which is no component'),
     (Iterated(kind="iterated"), {"mass": 2}, '"mass" steps every 2 ticks; components that are coupled must step at'),
     (Jacobi(), {"mas": 2}, '"mas" is given a step, but is no component; components are: mass, spring.'),
     (Jacobi(), {"mass": 0}, '"mass" shall step every 0 ticks; that must be a whole number from 1 on.'),
-    (
-        Energy(kind="energy", bonds=BOND),
-        {},
-        'The bond of "mass.y" [rad] and "spring.y" [rad] is no power; their product must be in W.',
-    ),
-    (
-        Energy(kind="energy", bonds=(("mass.y", "mass.y"),)),
-        {},
-        'The bond of "mass.y" and "mass.y" needs a wire from each of them to the component of the other.',
-    ),
+    (Energy(kind="energy", bonds=BOND), {}, 'The bond of "mass.y" [rad] and "spring.y" [rad] is no power; their'),
+    (Energy(kind="energy", bonds=(("mass.y", "mass.y"),)), {}, 'The bond of "mass.y" and "mass.y" needs a wire from'),
 ]
 
 

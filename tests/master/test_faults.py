@@ -91,10 +91,7 @@ def test_a_slow_component_meets_the_fault_at_its_own_ticks(tiny: Tiny) -> None:
 @pytest.mark.parametrize(
     ("on", "sentence"),
     [
-        (
-            "one.k",
-            'A fault is on "one.k", which is no signal and no input that a wire feeds; there are: one.a, one.b, r.',
-        ),
+        ("one.k", 'A fault is on "one.k", which is no signal and no input that a wire feeds; there are: one.a, one.b'),
         ("r.velocity", '"r.velocity", which is not one output; outputs are: r.value'),
     ],
 )

@@ -11,13 +11,11 @@ from oscillators import BOND, BOTH, H, Tiny, oscillator
 from simulating import simulate
 
 import cosim.master.execution
-from cosim.fmi.component import Port
 from cosim.master.execution import chunks
 from cosim.master.loop import library
 from cosim.master.loop.shared import opened
 from cosim.master.pool import Pool
 from cosim.master.result import Statistics, _speed, remarks
-from cosim.master.typed import _digits, _rule
 from cosim.support.errors import StepError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.wire import Wire
@@ -128,37 +126,6 @@ def test_a_wire_scales_shifts_and_rounds_in_its_own_unit_before_it_is_converted(
     value = gain * sent + offset
     rounded = quantum * np.floor(value / quantum + 0.5) if quantum else value
     np.testing.assert_allclose(run.recording["a"], np.radians(rounded), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("value", "digits"),
-    [
-        (3.0, "3"),
-        (-0.25, "-0.25"),
-        (1e15, "1000000000000000"),
-        (1e16, "10000000000000000"),
-        (2.0**53 + 2, "9007199254740994"),
-    ],
-)
-def test_a_value_is_told_with_all_its_digits_and_no_point_that_it_has_not(value: float, digits: str) -> None:
-    assert _digits(value) == digits
-
-
-def port(kind: str, items: dict[int, str] | None = None) -> Port:
-    made = object.__new__(Port)
-    for name, value in {"type": kind, "items": items or {}}.items():
-        object.__setattr__(made, name, value)
-    return made
-
-
-def test_a_rule_of_a_type_says_what_it_takes() -> None:
-    largest = float(np.finfo(np.float32).max)
-    assert _rule(port("Float32"), largest * 1.001) == "that is beyond a Float32"
-    assert _rule(port("Float32"), -largest * 1.001) == "that is beyond a Float32"
-    assert _rule(port("Float32"), largest).startswith("a Float32 cannot hold that exactly; cast = true")
-    assert _rule(port("Boolean"), 2.0) == "a Boolean takes 0 or 1"
-    assert _rule(port("Int8"), 400.0) == "an Int8 takes whole numbers from -128 to 127"
-    assert _rule(port("Enumeration", {1: "off", 3: "on"}), 2.0) == "its items are: 1 (off), 3 (on)"
 
 
 def test_a_pool_that_was_never_made_has_nothing_to_free() -> None:

@@ -53,12 +53,6 @@ def test_a_multiple_is_one_to_a_millionth(make: Make, version: int, off: float, 
     assert bool(notes(make("gain", version, **OWN[version]), 0.03 * (1 + off))) is noted
 
 
-@VERSIONS
-@pytest.mark.parametrize(("step", "every"), [(0.01, 1), (0.03, 1), (0.001, 20)])
-def test_a_step_that_is_a_multiple_is_not(make: Make, version: int, step: float, every: int) -> None:
-    assert notes(make("gain", version, **OWN[version]), step, every) == []
-
-
 @pytest.mark.parametrize(
     "more",
     [

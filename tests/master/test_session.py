@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.fmi.fmu import FmuComponent
 from cosim.support.errors import StepError, WiringError
 
 
@@ -38,16 +37,6 @@ def test_a_controller_in_python_acts_in_the_next_step(scenario: Path) -> None:
         for session in (given, mine):
             session.step(2)
         assert mine["plant.y"] != given["plant.y"]
-
-
-def test_a_step_is_one_tick_unless_it_is_said_how_many(scenario: Path) -> None:
-    with cosim.open(scenario) as session:
-        session.step()
-        assert session.tick == 1
-        session.step(3)
-        assert session.tick == 4
-        session.step(0)
-        assert session.tick == 4
 
 
 def test_an_input_without_a_wire_keeps_what_it_is_given(scenario: Path) -> None:
@@ -95,15 +84,3 @@ def test_a_component_that_asks_to_end_ends_the_session_without_an_error(scenario
         assert session.ended.startswith("plant asked to end the simulation at tick 10")
         with pytest.raises(StepError, match=r"asked to end the simulation .*: it cannot be stepped on"):
             session.step()
-
-
-def test_a_component_that_is_started_alone_starts_at_time_zero(
-    tiny: dict[int, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun: list[float] = []
-    with FmuComponent(tiny[3], "one") as one:
-        monkeypatch.setattr(one, "enter_initialisation", lambda _, time: begun.append(time))
-        monkeypatch.setattr(one, "exit_initialisation", lambda: None)
-        one.start({})
-        one.start({}, 2.5)
-    assert begun == [0.0, 2.5]

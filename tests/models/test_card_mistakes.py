@@ -2,14 +2,18 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from test_card import SMALL
 
-from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.card import EncoderSection, MountSection, parse_card, read_card
+from pyfmi_models.controller_section import AdaptationSection, ControllerSection, LearningSection
 from pyfmi_models.effects import CATALOGUE
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS
+from pyfmi_models.near import did_you_mean, near
+from pyfmi_models.numbers import shown
 
 LAW = "bad.toml: [friction]"
 EFFECT = "bad.toml: [[effects]] number 1"
@@ -18,36 +22,15 @@ COGGING = 'effect = "cogging"\ncycles_per_rev = 3\namplitude = 0.1\n'
 MISTAKES = {
     "no TOML": ("[mount", "bad.toml is not valid TOML: Expected ']'"),
     "key twice": (SMALL + "Fc = 2\n", "bad.toml is not valid TOML: Cannot overwrite a value"),
-    "unknown section": (
-        SMALL + "[fricton]\n",
-        "bad.toml: [fricton] is not a key of a card; keys are: mount, friction,",
-    ),
-    "unknown key": (
-        SMALL + "[encoder]\ncounts = 3\n",
-        "bad.toml: [encoder] counts is not a key of a card; keys are: counts_per_rev,",
-    ),
+    "unknown section": (SMALL + "[fricton]\n", "bad.toml: [fricton] is not a key of a card; keys are: mount"),
+    "unknown key": (SMALL + "[encoder]\ncounts = 3\n", "bad.toml: [encoder] counts is not a key of a card; keys are"),
     "no friction": ("[mount]\ninertia = 2\n", "bad.toml: [friction] is missing."),
     "no inertia": (SMALL.replace("inertia = 2.0", ""), "bad.toml: [mount] inertia is missing."),
-    "negative inertia": (
-        SMALL.replace("2.0", "-2.0"),
-        "bad.toml: [mount] inertia = -2.0 breaks the rule: input should be greater than or equal to 0.000000001.",
-    ),
-    "infinite inertia": (
-        SMALL.replace("2.0", "inf"),
-        "bad.toml: [mount] inertia = inf breaks the rule: input should be a finite number.",
-    ),
-    "inertia in quotes": (
-        SMALL.replace("2.0", '"2.0"'),
-        "bad.toml: [mount] inertia = '2.0' breaks the rule: input should be a valid number.",
-    ),
-    "no section": (
-        'mount = 3\n[friction]\nmodel = "none"\n',
-        "bad.toml: [mount] = 3 breaks the rule: it must be a section with keys.",
-    ),
-    "a number for a name": (
-        SMALL + "[columns]\ntau = 3\n",
-        "bad.toml: [columns] tau = 3 breaks the rule: it must be text in quotes.",
-    ),
+    "negative inertia": (SMALL.replace("2.0", "-2.0"), "bad.toml: [mount] inertia = -2.0 breaks the rule: input"),
+    "infinite inertia": (SMALL.replace("2.0", "inf"), "bad.toml: [mount] inertia = inf breaks the rule: input should"),
+    "inertia in quotes": (SMALL.replace("2.0", '"2.0"'), "bad.toml: [mount] inertia = '2.0' breaks the rule: input"),
+    "no section": ('mount = 3\n[friction]\nmodel = "none"\n', "bad.toml: [mount] = 3 breaks the rule: it must be a"),
+    "a number for a name": (SMALL + "[columns]\ntau = 3\n", "bad.toml: [columns] tau = 3 breaks the rule: it must be"),
     "wrong word": (
         SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
         "compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a', 'C3b' or 'C2a+C3a'.",
@@ -97,10 +80,7 @@ MISTAKES = {
         SMALL + '[[effects]]\neffect = "coging"\n',
         f"{EFFECT}: effect = 'coging' is unknown; effects are: {', '.join(CATALOGUE)}.",
     ),
-    "effects as one table": (
-        SMALL + '[effects]\neffect = "x"\n',
-        "[effects] is one table; write [[effects]] above each effect, ",
-    ),
+    "effects as one table": (SMALL + '[effects]\neffect = "x"\n', "[effects] is one table; write [[effects]] above"),
     "missing amplitude": (
         SMALL + '[[effects]]\neffect = "cogging"\ncycles_per_rev = 3\n',
         f"{EFFECT} (cogging): amplitude is missing.",
@@ -187,10 +167,7 @@ def test_compensation_needs_bristles() -> None:
 @pytest.mark.parametrize(
     ("section", "sentence"),
     [
-        (
-            "learning]\nperiod = 0.01",
-            "period = 0.01 is not a whole number of ticks of 0.0001 s, at least one a knot (101).",
-        ),
+        ("learning]\nperiod = 0.01", "period = 0.01 is not a whole number of ticks of 0.0001 s, at least one a knot"),
         ("learning]\nperiod = 0.01005", "period = 0.01005 is not a whole number of ticks of 0.0001 s, at least one"),
         ("adaptation]", 'goes with compensation = "C2a" or "C3a"; it is "C1".'),
     ],
@@ -199,3 +176,133 @@ def test_what_a_controller_cannot_be_composed_of_is_said(section: str, sentence:
     text = f"{SMALL}[controller]\nkp = 1\nkd = 1\n[controller.{section}\n".replace("0.01\n", "0.01\nknots = 101\n")
     with pytest.raises(CardError, match=re.escape(sentence)):
         parse_card(text, "c.toml").controller_model()
+
+
+# Numbers, names and words of a card at their limits: the last that is taken, the first that is refused.
+
+
+CARD = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
+RANGES: dict[type, dict[str, tuple[float, float, float, float]]] = {
+    MountSection: {"inertia": (1e-9, 1e12, 0.99e-9, 1.001e12), "torque_limit": (1e-9, 1e12, 0.99e-9, 1.001e12)},
+    EncoderSection: {
+        "counts_per_rev": (0.0, 2.0**53, -1e-9, 2.0**53 + 2),
+        "noise_rms": (0.0, 1e12, -1e-300, 1.001e12),
+        "ratio": (1e-9, 1e12, 0.99e-9, 1.001e12),
+    },
+    ControllerSection: {
+        "kp": (1e-300, 1e12, 0.0, 1.001e12),
+        "kd": (1e-300, 1e12, 0.0, 1.001e12),
+        "loop_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
+        "record_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
+        "observer_bandwidth": (1e-300, 1e9, 0.0, 1.001e9),
+        "observer_order": (3, 4, 2, 5),
+    },
+    LearningSection: {
+        "period": (1e-300, 1e9, 0.0, -1.0),
+        "knots": (3, 1000, 2, 1001),
+        "gain": (1e-300, 1.0, 0.0, 1.001),
+    },
+    AdaptationSection: {
+        "memory": (0.1, 1e9, 0.099, -1.0),
+        "slowest": (0.0, 1e9, -1e-300, -1.0),
+        "widest": (1.0, 1e9, 0.999, -1.0),
+        "doubt": (1e-300, 1e9, 0.0, -1.0),
+        "noise": (1e-300, 1e9, 0.0, -1.0),
+    },
+}
+"""Sections of a card, by key: lowest and highest number that it takes, and two that it refuses."""
+NEEDED: dict[type, dict[str, Any]] = {
+    MountSection: {"inertia": 1.0},
+    ControllerSection: {"kp": 1.0, "kd": 1.0},
+    LearningSection: {"period": 1.0},
+}
+
+
+@pytest.mark.parametrize(("section", "key"), [(section, key) for section, keys in RANGES.items() for key in keys])
+def test_a_section_takes_numbers_up_to_their_limits(section: Any, key: str) -> None:
+    low, high, under, over = RANGES[section][key]
+    needed = NEEDED.get(section, {})
+    for value in (low, high):
+        assert getattr(section(**(needed | {key: value})), key) == value
+    for value in (under, over):
+        with pytest.raises(ValueError, match=key):
+            section(**(needed | {key: value}))
+
+
+def test_what_a_card_does_not_say_is_what_the_documentation_says() -> None:
+    assert MountSection(inertia=1.0).model_dump() == {
+        "name": "mount",
+        "motion": "rotary",
+        "inertia": 1.0,
+        "torque_limit": 1e6,
+        "machine": None,
+    }
+    assert EncoderSection().model_dump() == {"counts_per_rev": 0.0, "noise_rms": 0.0, "ratio": 1.0}
+
+
+@pytest.mark.parametrize(("value", "good"), [("0.999e300", True), ("1e300", False), ("-1e300", False), ("true", False)])
+def test_a_number_of_a_law_is_below_what_arithmetic_takes(value: str, good: bool) -> None:
+    text = CARD.replace("Fc = 1.0", f"Fc = {value}")
+    if good:
+        assert parse_card(text, "a.toml").friction.Fc == float(value)  # type: ignore[attr-defined]
+        return
+    with pytest.raises(CardError, match=r"a.toml: \[friction\]: Fc = .* is not a number"):
+        parse_card(text, "a.toml")
+
+
+@pytest.mark.parametrize(("length", "good"), [(100, True), (101, False)])
+def test_a_name_has_up_to_a_hundred_characters(length: int, good: bool) -> None:
+    text = CARD.replace("[mount]", f'[mount]\nname = "{"m" * length}"')
+    if good:
+        assert parse_card(text, "a.toml").plant().name == "m" * length
+        return
+    with pytest.raises(CardError, match=r"\[mount\] name"):
+        parse_card(text, "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("index", "text"), [(1, "[[effects]]"), (2, "[[effects]]\neffect = 'delay'\ndelay_ms = 1.0\n[[effects]]")]
+)
+def test_an_effect_is_named_by_its_number_from_one_on(index: int, text: str) -> None:
+    with pytest.raises(CardError, match=rf"a.toml: \[\[effects\]\] number {index}: effect is missing; effects are: "):
+        parse_card(f"{CARD}{text}\n", "a.toml")
+
+
+def test_of_a_list_the_number_that_is_wrong_is_told_from_one_on() -> None:
+    text = f'{CARD}[[effects]]\neffect = "cogging"\ncycles_per_rev = 3\namplitude = 1.0\nharmonics = [0.1, 101.0]\n'
+    with pytest.raises(CardError, match=r"harmonics\[2\] = 101 is outside -100 .. 100"):
+        parse_card(text, "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("a" * 58, repr("a" * 58)),
+        ("a" * 59, f"{repr('a' * 59)[:60]}... (61 characters)"),
+        ("a" * 2000, f"{repr('a' * 2000)[:60]}... (2,002 characters)"),
+        (7, "7"),
+    ],
+)
+def test_a_value_of_more_than_sixty_characters_is_cut_short(value: object, text: str) -> None:
+    assert shown(value) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "choices", "meant"),
+    [
+        ("sideral", ["sidereal", "demo"], "sidereal"),
+        ("SIDEREAL", ["sidereal", "demo"], "sidereal"),
+        ("stpe", ["stop", "step"], "step"),
+        ("xyz", ["sidereal", "demo"], ""),
+        ("abcdexxx", ["abcdeyyy"], "abcdeyyy"),
+        ("abcdxxxx", ["abcdyyyy"], ""),
+        ("a" * 100 + "b" * 50, ["a" * 100 + "c" * 50], "a" * 100 + "c" * 50),
+    ],
+)
+def test_the_name_that_was_meant_shares_six_tenths_of_its_letters(name: str, choices: list[str], meant: str) -> None:
+    assert near(name, choices) == meant
+    assert did_you_mean(name, choices) == (f' Did you mean "{meant}"?' if meant else "")
+
+
+def test_a_name_that_is_right_is_not_suggested() -> None:
+    assert did_you_mean("demo", ["demo", "demos"]) == ""

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from effect_examples import example
-from pydantic import ValidationError
 from test_parameter_ranges import told
 
 from pyfmi_models.adrc import Adaptation, Gains, Learning
@@ -118,46 +117,6 @@ def test_a_controller_declares_its_numbers_as_its_fmus_do() -> None:
         *("tau", "friction_estimate", "zeta1", "zeta2", "zeta3"),
     ]
     assert {one.start for one in (*INPUTS, *MEMORY, *OUTPUTS)} == {0.0}
-
-
-CARD: dict[type, dict[str, tuple[Any, ...]]] = {
-    ControllerSection: {
-        "kp": (1e-300, 1e12, 0.0, 1.001e12),
-        "kd": (1e-300, 1e12, 0.0, 1.001e12),
-        "loop_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
-        "record_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
-        "observer_bandwidth": (1e-300, 1e9, 0.0, 1.001e9),
-        "observer_order": (3, 4, 2, 5),
-    },
-    LearningSection: {
-        "period": (1e-300, 1e9, 0.0, -1.0),
-        "knots": (3, 1000, 2, 1001),
-        "gain": (1e-300, 1.0, 0.0, 1.001),
-    },
-    AdaptationSection: {
-        "memory": (0.1, 1e9, 0.099, -1.0),
-        "slowest": (0.0, 1e9, -1e-300, -1.0),
-        "widest": (1.0, 1e9, 0.999, -1.0),
-        "doubt": (1e-300, 1e9, 0.0, -1.0),
-        "noise": (1e-300, 1e9, 0.0, -1.0),
-    },
-}
-"""Sections of a card, by key: lowest and highest number that it takes, and two that it refuses."""
-NEEDED: dict[type, dict[str, Any]] = {
-    ControllerSection: {"kp": 1.0, "kd": 1.0},
-    LearningSection: {"period": 1.0},
-    AdaptationSection: {},
-}
-
-
-@pytest.mark.parametrize(("section", "key"), [(section, key) for section, keys in CARD.items() for key in keys])
-def test_a_card_of_a_controller_takes_numbers_up_to_their_limits(section: Any, key: str) -> None:
-    low, high, under, over = CARD[section][key]
-    for value in (low, high):
-        assert getattr(section(**(NEEDED[section] | {key: value})), key) == value
-    for value in (under, over):
-        with pytest.raises(ValidationError):
-            section(**(NEEDED[section] | {key: value}))
 
 
 def test_what_a_card_does_not_say_of_its_controller_is_what_the_documentation_says() -> None:

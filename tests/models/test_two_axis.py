@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
-from math import cos, hypot, pi, sin
+from math import cos, pi, sin
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,6 @@ from pyfmi_models.export import export_fmu
 from pyfmi_models.friction.coulomb import Frictionless
 from pyfmi_models.model import Model
 from pyfmi_models.mount import Axis, Mount
-from pyfmi_models.pointing import PointingError
 
 ARCSEC = pi / 648000
 TUBE, ZENITH_INERTIA, TUBE_INERTIA = 12.0, 24.0, 20.0
@@ -87,12 +86,6 @@ def test_energy_changes_by_the_work_of_the_torques_alone(
     assert (ends[1] - ends[0]) / (2 * h) == pytest.approx(power, abs=1e-6)
 
 
-def test_turning_swings_the_tube_down_and_a_sinking_tube_slows_the_turning() -> None:
-    slowing, sinking = accelerations(0.7, turning=0.5, swinging=-0.1, torques=(0.0, 0.0))
-    assert sinking == pytest.approx(-TUBE * sin(1.4) * 0.5**2 / 2 / TUBE_INERTIA)
-    assert slowing < 0
-
-
 @pytest.fixture(scope="module")
 def free(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Both axes without friction, as FMUs."""
@@ -129,24 +122,6 @@ def test_two_fmus_swing_as_one_body_does_to_the_order_of_their_coupling(free: di
     errors = [np.abs(swing(free, step) - exact).max() for step in (4e-3, 2e-3, 1e-3)]
     assert errors[2] < 2e-4
     np.testing.assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 2, rtol=0.05)
-
-
-# Where the mount points
-
-
-def pointing(*angles: float) -> tuple[float, float, float]:
-    names = ("azimuth_d", "altitude_d", "azimuth", "altitude")
-    found = evaluate(PointingError().model(), **dict(zip(names, angles, strict=True)))
-    return found["cross_elevation"], found["elevation"], found["error"]
-
-
-@pytest.mark.parametrize("turns", [0, 1, -3])
-def test_azimuth_errors_shrink_with_the_cosine_of_the_altitude_and_whole_turns_do_not_count(turns: int) -> None:
-    altitude, off = np.radians(80.0), np.array([3.0, -2.0]) * ARCSEC
-    cross, up, whole = pointing(1.0 + off[0] + 2 * pi * turns, altitude + off[1], 1.0, altitude)
-    assert abs(cross) == pytest.approx(cos(altitude) * off[0], rel=1e-6)
-    assert up == pytest.approx(off[1], rel=1e-6)
-    assert whole == pytest.approx(hypot(cross, up), rel=1e-5)
 
 
 # The scenario

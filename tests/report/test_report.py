@@ -228,7 +228,7 @@ FLAGS = """--headless --no-sandbox --disable-gpu --disable-quic --no-first-run -
 --disable-component-update --disable-sync --enable-logging=stderr --virtual-time-budget=5000 --dump-dom"""
 
 
-@pytest.mark.parametrize(("kind", "motion", "width"), [(*CASES[0], 1280), *((*one, 390) for one in CASES)])
+@pytest.mark.parametrize(("kind", "motion", "width"), [(*CASES[0], 1280), (*CASES[2], 390), (*CASES[3], 390)])
 def test_browser_shows_it_without_complaint(kind: str, motion: str, width: int, tmp_path: Path) -> None:
     chromium = shutil.which("chromium")
     if chromium is None:

@@ -22,7 +22,6 @@ from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture
 from cosim.report.terminal import summary
 from cosim_serve.work import in_words
-from pyfmi_models.effects import Cogging
 
 MAYBE = replace(FOUND[1], effect="cable_wrap", title="Cable wrap", answer="ambiguous", probability=0.49)
 
@@ -114,11 +113,6 @@ def test_the_lead_names_every_open_question() -> None:
     told = said(replace(of(*FOUND, *RIVALS, *pair), ambiguous_with=sets))
     assert "two possible causes: gravity unbalance or encoder eccentricity" in told
     assert "two possible causes: other gravity unbalance or other encoder eccentricity" in told
-
-
-def test_a_ripple_is_told_with_the_digits_that_a_mechanic_reads() -> None:
-    assert "399.8 times per metre" in Cogging(cycles_per_rev=399.8213, amplitude=2.0).statement("N")
-    assert "24 times per turn" in Cogging(cycles_per_rev=24.0, amplitude=2.0).statement()
 
 
 # The report and the terminal on what has no name: learned as a table, or tried and left out.
@@ -227,7 +221,3 @@ def test_where_nothing_was_added_one_model_is_drawn_and_named_once() -> None:
     text = text_of(report_of("none"))
     assert "Worst seconds" in text
     assert "Worst before" not in text
-
-
-def test_the_box_says_which_model_to_use_outside_the_range() -> None:
-    assert "Outside this range it is not validated: use the original model there." in text_of(report_of("two"))

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis, report_of
 from report_text import text_of
@@ -17,10 +16,8 @@ from cosim.diagnosis.measure.breakdown import samples
 from cosim.diagnosis.measure.findings import advice, visible_from
 from cosim.diagnosis.search.sizes import Numbers
 from cosim.plots.style import STYLE
-from cosim.report import lead, render, words
+from cosim.report import render, words
 from cosim.report.figures_dynamic import effect as draw
-from cosim.report.figures_proof import looked_for
-from cosim.report.figures_time import recording
 from cosim.report.findings import block, do, where
 from cosim.report.page import identity, unexplained
 from cosim.report.quantities import Scales
@@ -53,14 +50,6 @@ def test_no_effect_that_the_model_lacks_is_sent_to_it() -> None:
         assert without.endswith(".")
         assert given.startswith(without.removesuffix("."))
         assert advice(kind, True, motion) == given  # type: ignore[arg-type]
-
-
-def test_stribeck_friction_is_drawn_at_its_own_speeds() -> None:
-    whole = diagnosis("two")
-    slow = replace(FOUND[0], effect="stribeck", parameters={"Fs": 1.4, "Vs": 0.05})
-    caption = drawn(slow, whole).caption
-    assert "Dotted: 2.9°/s, over which friction falls." in caption
-    assert drawn(slow, whole).svg != drawn(replace(slow, parameters={}), whole).svg
 
 
 def test_a_rival_that_fits_as_well_is_less_likely_and_not_ruled_out() -> None:
@@ -152,39 +141,7 @@ def test_the_header_counts_what_was_recorded_and_not_what_was_judged() -> None:
     ]
 
 
-def test_a_rate_of_just_below_1_khz_is_1_khz() -> None:
-    whole = diagnosis("two")
-    runs = [entry | {"rate_hz": 999.97} for entry in whole.provenance["recordings"]]
-    rests = [part["rest"] for part in identity(replace(whole, provenance=whole.provenance | {"recordings": runs}))]
-    assert ", 180 s at 1\N{NO-BREAK SPACE}kHz" in rests
-
-
 SIGNALS = ("t", "q", "v", "tau", "before", "after", "missing", "band")
-
-
-def test_a_black_line_over_nearly_everything_is_a_number_instead() -> None:
-    whole, scales = diagnosis("two"), Scales.of(diagnosis("two"))
-    often, seldom = (replace(whole.traces[0], intervals=((0.0, end),)) for end in (54.0, 5.0))
-    with mpl.rc_context(STYLE):
-        said = [recording(0, one, scales, (1.0, 1.0)).caption for one in (often, seldom)]
-    assert "Above the noise for 90 % of the time, rests and short returns counted." in said[0]
-    assert "Black line" in said[1]
-
-
-def test_a_recording_that_was_not_fitted_has_a_ground_of_its_own() -> None:
-    whole, scales = diagnosis("two"), Scales.of(diagnosis("two"))
-    with mpl.rc_context(STYLE):
-        drawings = [recording(0, one, scales, (1.0, 1.0)).svg for one in whole.traces]
-    assert ["var(--shade)" in one for one in drawings] == [one.heldout for one in whole.traces]
-
-
-def test_the_overview_draws_only_what_has_a_size() -> None:
-    with mpl.rc_context(STYLE):
-        picture = looked_for(FOUND + RIVALS + REST, ())
-        assert looked_for(REST[:2] + REST[3:], ()) is None
-    assert picture is not None
-    assert "Cogging" in picture.svg
-    assert "Clock skew" not in picture.svg
 
 
 def held(first: Finding, *others: Finding) -> Diagnosis:
@@ -247,31 +204,6 @@ def test_doubts_about_the_recordings_stand_before_the_answer() -> None:
     doubt = Sanity(finding="torque_sign", statement="The torque drives the axis backwards.")
     html = render(replace(diagnosis("two"), sanity=(doubt,)))
     assert html.index("The torque drives the axis backwards.") < html.index('class="lead"')
-
-
-def test_a_held_out_recording_and_the_noise_have_swatches_of_their_own() -> None:
-    html = report_of("two")
-    assert '<span class="noise">noise band, 95 %</span><span class="held">not used for fitting</span>' in html
-
-
-def test_the_explorer_has_a_legend() -> None:
-    explorer = report_of("two").split('id="explorer"')[1].split("<canvas")[0]
-    for said in ("measured", "before, refitted", "with the two effects", "not used for fitting"):
-        assert f">{said}</span>" in explorer
-
-
-def test_figures_take_their_colours_from_the_page_which_may_be_dark() -> None:
-    html = report_of("two")
-    figures: Any = re.findall(r"<svg.*?</svg>", html, re.S)
-    assert "prefers-color-scheme: dark" in html
-    assert all(not re.search("#1a1a1a|#cc6a00|#00558c|#ffffff", one) for one in figures if " plate" not in one[:200])
-
-
-def test_rows_of_a_lead_are_whole_sentences() -> None:
-    for kind in ("two", "none", "unknown"):
-        whole = diagnosis(kind)
-        assert all(re.match(r"^[A-Z0-9].*[.!]$", text) for text in lead.lead(whole, Scales.of(whole)))
-        assert np.isfinite(whole.heldout.before_rms)
 
 
 def test_a_limit_is_of_the_number_that_is_told_as_the_size() -> None:

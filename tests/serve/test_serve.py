@@ -15,10 +15,12 @@ from serving import (
     ORIGIN,
     TOKEN,
     _path,
+    act,
     alive,
     client,
     client_of,
     desk,
+    id_of,
     new,
     put,
     ready,
@@ -28,8 +30,9 @@ from serving import (
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.support.errors import InputError, OutputError
+from cosim.support.errors import InputError
 from cosim.support.lock import claimed
+from cosim_serve import example
 from cosim_serve.desk import Desk
 from cosim_serve.job import Upload
 from cosim_serve.server import listening
@@ -194,20 +197,48 @@ def test_a_diagnosis_names_files_as_the_user_knows_them(tmp_path: Path) -> None:
         diagnose_order(order)
 
 
-def test_no_room_on_the_disk_is_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim_serve import uploads
-
-    def full(*_: object) -> None:
-        raise OutputError("3 MB are needed and the disk has 1 MB: remove older diagnoses.")
-
-    monkeypatch.setattr(uploads, "check_room", full)
-    answer = put(client, new(client), "run.csv", recording())
-    assert "remove older diagnoses" in answer.json()["problem"]
-
-
 def test_a_file_with_signs_in_its_name_arrives(client: TestClient, desk: Desk) -> None:
     job = new(client)
     name = "Lauf #1 & 50% + Übung.csv"
     assert client.put(f"{job}/files?name={quote(name)}", content=recording()).status_code == 201
     assert state_of(desk, job).uploads[0].name == name
     assert ORIGIN
+
+
+# First steps on the page: an example to try, a card from the recordings.
+
+
+def test_the_example_is_a_draft_that_lacks_nothing(client: TestClient, desk: Desk) -> None:
+    answer = client.post("/example", headers={"origin": str(client.base_url)})
+    job = desk.store.get(str(answer.url).rpartition("/")[2])
+    assert [one.name for one in job.uploads] == list(example.NAMES)
+    assert [one.role for one in job.uploads] == ["train", "train", "heldout"]
+    assert desk.lacking(job) == []
+    assert "example axis" in answer.text
+    act(client, f"/jobs/{job.id}", "start")
+    assert desk.store.get(job.id).state != "draft"
+
+
+def test_a_card_is_estimated_from_the_recordings(client: TestClient, desk: Desk) -> None:
+    job = new(client)
+    assert "there is none yet" in act(client, job, "estimate").text
+    put(client, job, "one.csv", example.recordings()[example.NAMES[0]].encode())
+    assert "The end of the only recording is for validation" in client.get(job).text
+    act(client, job, "estimate")
+    text = desk.card_text(desk.store.get(id_of(job)))
+    inertia = float(re.findall(r"^inertia = ([\d.]+)", text, re.MULTILINE)[0])
+    assert inertia == pytest.approx(example.INERTIA, rel=0.05)
+    assert desk.lacking(desk.store.get(id_of(job))) == []
+
+
+def test_what_is_dropped_and_tells_nothing_is_a_sentence(client: TestClient) -> None:
+    job = new(client)
+    put(client, job, "rest.csv", b"t,tau,q\n" + b"".join(b"%.2f,0,0\n" % (k / 100) for k in range(400)))
+    assert "No card can be estimated: " in act(client, job, "estimate").text
+
+
+def test_the_last_of_several_recordings_proves_where_none_was_chosen(client: TestClient) -> None:
+    job = new(client)
+    for name in ("a.csv", "b.csv"):
+        put(client, job, name, example.recordings()[example.NAMES[0]].encode())
+    assert "b.csv, the last one, is for validation" in client.get(job).text

@@ -68,11 +68,7 @@ def test_a_number_of_workers_changes_nothing_but_time(folder: Path) -> None:
     [
         ("fail_at = 0.3", "failed", 'plant returned an error at tick 300 (0.3 s); it said "the shaft broke"; its last'),
         ("nan_at = 0.3", "failed", "plant gave an output that is not a finite number at tick 300 (0.3 s)"),
-        (
-            "fail_at = 0.3, status = 11",
-            "crashed",
-            "The process of this run crashed: it was ended by signal 11, SIGSEGV",
-        ),
+        ("fail_at = 0.3, status = 11", "crashed", "The process of this run crashed: it was ended by signal 11"),
         ("fail_at = 0.3, status = 12", "timeout", "It was given up: no answer within 8 s."),
     ],
 )

@@ -85,8 +85,7 @@ def test_a_second_name_that_fmi_3_gives_a_variable_is_that_variable(tiny: dict[i
 
 
 WRONG = {
-    'variables = { a = "Motor.torqe" }': '"plant.a" stands for "Motor.torqe", which does not exist; names like it '
-    "are: Motor.torque, Brake.torque",
+    'variables = { a = "Motor.torqe" }': '"plant.a" stands for "Motor.torqe", which does not exist; names like it are',
     'variables = { mode = "Motor.torque" }': '"plant.mode" stands for "Motor.torque", but there is a "mode" already;',
     'variables = { a = "Motor.torque", b = "Motor.torque" }': '"Motor.torque" of plant has two names in its variables',
     'variables = { a = { name = "Motor.torque", unit = "deg" } }': '"plant.a" is in rad, as its model says, and',

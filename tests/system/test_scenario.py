@@ -107,45 +107,17 @@ def test_the_reference_of_the_paper_is_shipped() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        (
-            "stop = 0.5",
-            "stop = 0.5\nstp = 1",
-            'loop.toml: "stp" is no key of a scenario; keys there are: name, description, notes,',
-        ),
-        (
-            'fmu = "tiny3.fmu"',
-            'fmuu = "x"',
-            '"components.plant.fmuu" is no key of a scenario; keys there are: fmu, card, part,',
-        ),
-        (
-            "seed = 7",
-            "seed = 7\nrate = 1",
-            '"signals.n.noise.rate" is no key of a scenario; keys there are: unit, kind, rms, seed.',
-        ),
+        ("stop = 0.5", "stop = 0.5\nstp = 1", 'loop.toml: "stp" is no key of a scenario; keys there are: name'),
+        ('fmu = "tiny3.fmu"', 'fmuu = "x"', '"components.plant.fmuu" is no key of a scenario; keys there are: fmu'),
+        ("seed = 7", "seed = 7\nrate = 1", '"signals.n.noise.rate" is no key of a scenario; keys there are: unit'),
         ("gain = 2.0", "gian = 2.0", '"connections.1.gian" is no key of a scenario; keys there are: from, to, gain,'),
-        (
-            "decimation = 2",
-            "decimate = 2",
-            '"record.decimate" is no key of a scenario; keys there are: signals, decimation,',
-        ),
+        ("decimation = 2", "decimate = 2", '"record.decimate" is no key of a scenario; keys there are: signals'),
         ("stop = 0.5\n", "", 'loop.toml: "stop" is missing.'),
         ("stop = 0.5", "stop = -0.5", "loop.toml: stop = -0.5 breaks a rule: input should be greater than 0."),
         ("stop = 0.5", "stop = 0.50005", "loop.toml: stop = 0.50005 is not a whole number of steps of 0.001 s."),
-        (
-            "decimation = 2",
-            "decimation = 0",
-            "record.decimation = 0 breaks a rule: input should be greater than or equal to 1.",
-        ),
-        (
-            'fmu = "tiny3.fmu"',
-            'card = "x"',
-            'components.plant breaks a rule: give fmu = "...", or card = "..." with part = ',
-        ),
-        (
-            'kind = "noise"',
-            'kind = "nose"',
-            "signals.n breaks a rule: 'kind' 'nose' is none of '",
-        ),
+        ("decimation = 2", "decimation = 0", "record.decimation = 0 breaks a rule: input should be greater than or"),
+        ('fmu = "tiny3.fmu"', 'card = "x"', 'components.plant breaks a rule: give fmu = "...", or card = "..." with'),
+        ('kind = "noise"', 'kind = "nose"', "signals.n breaks a rule: 'kind' 'nose' is none of '"),
         ('kind = "noise"', "", "signals.n breaks a rule: it needs a 'kind'."),
         ('name = "loop"', "name = 7", "loop.toml: name = 7 breaks a rule: it must be text in quotes."),
         (

@@ -60,6 +60,15 @@ def droop(now: dict[str, Array]) -> Array:
     return 0.05 * needed * np.abs(needed)
 
 
+def iron(now: dict[str, Array]) -> Array:
+    """An elastic stop over 0.25 rad."""
+    state, out = 0.0, []
+    for step in np.diff(now["q"], prepend=now["q"][0]) / 0.25:
+        state = min(max(state + step, -1.0), 1.0)
+        out.append(1.0 * state)
+    return np.array(out)
+
+
 def wanders(now: dict[str, Array]) -> Array:
     """Large, and of another sign in each night: what was learned from two helps no third."""
     return (-1.0 if now["run"][0] == 3 else 1.0) * np.cos(20 * now["q"])

@@ -63,9 +63,6 @@ class Tables:
     mount = Structure((Named("b"),))
     prepared = None
 
-    def __init__(self) -> None:
-        self.fitted: list[str] = []
-
     def enter(self, *_: object) -> None:
         """Nothing is written into a ledger here."""
 
@@ -77,7 +74,6 @@ class Tables:
 
     def fit(self, mount: Structure, iterations: int) -> Fitted:
         assert 1 < iterations < 100
-        self.fitted.append(mount.names)
         return Fitted(mount)
 
     def without(self, found: Fitted, name: str) -> Fitted:

@@ -77,12 +77,6 @@ def test_a_small_offset_that_is_there_predicts_and_its_opposite_does_not(seed: i
     assert predicted(recording, TorqueOffset(torque=-offset)) < 0
 
 
-def test_the_gain_of_a_constant_is_what_its_energy_is_worth_in_its_band() -> None:
-    v = np.sin(np.arange(SECONDS * RATE) / RATE)
-    one, double = (predicted(held_out(white(7) + k * NOISE, v), TorqueOffset(torque=k * NOISE)) for k in (0.3, 0.6))
-    assert 1.5 < double / one < 4
-
-
 def test_what_acts_in_one_second_of_a_minute_predicts() -> None:
     t = np.arange(SECONDS * RATE) / RATE
     v = 1 + 2 * np.exp(-(((t - 30.5) / 0.15) ** 2)) + 0.1 * np.sin(t)
@@ -211,13 +205,6 @@ def offset(monkeypatch: pytest.MonkeyPatch, rival: CandidateFit) -> AcceptedEffe
     monkeypatch.setattr(rivals, "stage", lambda _, fit, *__: Stage(fit, () if fit.mount.effects else (rival,)))
     (one,) = examine(comparison, Search(base, (Stage(found, ()),))).effects
     return one
-
-
-def test_of_what_is_nothing_the_true_evidence_and_gain_are_nothing() -> None:
-    for effect in NOTHING:
-        one = beside(effect)
-        assert one.evidence <= 0.1, effect.id
-        assert one.plain_gain < POLICY.negligible, effect.id
 
 
 @pytest.mark.parametrize("effect", NOTHING, ids=lambda one: one.id)

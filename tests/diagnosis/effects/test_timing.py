@@ -19,10 +19,7 @@ from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
-from cosim.diagnosis.search.sizes import is_told, numbers_of, standard_errors
 from cosim.diagnosis.search.stages import CandidateFit, admission, margin, refitted
-from cosim.estimation.blocks import Blocks
-from cosim.estimation.fit import recorded_by
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.card import parse_card
@@ -60,12 +57,6 @@ def test_the_right_one_of_delay_and_lag_is_told_in_noise_that_the_controller_ans
         assert misfits[other] - misfits[drive.id] > DECISIVE
 
 
-def test_slow_motion_tells_neither_from_the_other() -> None:
-    drive = Delay(delay_ms=0.5)
-    misfits = misfits_of(answered(drive, 2e-6, 2.0), replace(BASE, effects=(drive,)), drive)
-    assert abs(misfits["delay"] - misfits["actuator_lag"]) < DECISIVE
-
-
 def test_without_a_set_point_nothing_is_said() -> None:
     drive = Delay(delay_ms=5.0)
     prepared = answered(drive, 0.0)
@@ -86,11 +77,6 @@ def test_how_late_a_reading_is_behind_its_set_point_is_measured_within_its_error
     assert late is not None
     assert abs(late.seconds - 5e-3) < 3 * late.error + 2e-5
     assert late.error < 1e-4
-
-
-def test_a_reading_that_trails_by_what_the_torque_is_late_is_the_clock_and_one_that_does_not_is_the_drive() -> None:
-    assert attributed(trailing(5e-3), 5.2e-3, 1e-3) == "clock"
-    assert attributed(trailing(0.0), 5e-3, 1e-3) == "drive"
 
 
 def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_was_not_recorded() -> None:
@@ -171,14 +157,6 @@ def tried(effect: Effect, noise: float, ripple: float) -> Tried:
 BENT, DELAYED = (CONTACT, 0.1, 0.0), (LATE, 0.02, 0.03)
 
 
-def told(this: Tried, name: str) -> tuple[bool, dict[str, float]]:
-    """Whether the size of one is told, and the errors of its numbers."""
-    one, problem = this.fits[name], this.comparison.problem
-    errors = standard_errors(one.fit, Blocks.of(problem.prepared), problem.weight)
-    numbers = numbers_of(one.effect, one.fit.mount, errors)
-    return is_told(one.effect, numbers, one.fit.mount, recorded_by(problem.prepared.pieces)), numbers.errors
-
-
 @pytest.mark.parametrize(("case", "name"), [(BENT, "presliding"), (DELAYED, "delay")])
 def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
     case: tuple[Effect, float, float], name: str
@@ -192,28 +170,6 @@ def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
         if all_pass(admission(this.comparison, one)) and margin(this.comparison, own, one) < POLICY.fair
     }
     assert near == {name}
-
-
-def test_a_play_without_a_gap_is_the_contact_that_bends_in_all_but_its_name_and_no_rival_of_it() -> None:
-    this = tried(*BENT)
-    contact, play = this.fits["presliding"], this.fits["backlash"]
-    assert contact.plain_gain > 0.8
-    assert play.plain_gain == pytest.approx(contact.plain_gain, abs=0.02)
-    assert contact.evidence - play.evidence > 100, "each with what laws lack at stops beside the play alone"
-    assert margin(this.comparison, contact, play) < 10, "and none of it beside either"
-    assert play.effect.gap_rad < 1e-4  # type: ignore[attr-defined]
-    assert not all_pass(admission(this.comparison, play))
-
-
-def test_the_range_of_the_one_that_is_there_holds_its_size_and_that_of_an_imitator_tells_none() -> None:
-    bent, late = tried(*BENT), tried(*DELAYED)
-    is_size, errors = told(bent, "presliding")
-    assert is_size
-    stiffness = float(bent.fits["presliding"].effect.sigma0)  # type: ignore[attr-defined]
-    assert abs(stiffness - CONTACT.sigma0) < 1.96 * errors["sigma0"] < 0.1 * CONTACT.sigma0
-    assert not told(bent, "delay")[0], "its 95 % range holds no delay at all"
-    assert told(bent, "delay")[1]["delay_ms"] > 20 * told(late, "delay")[1]["delay_ms"]
-    assert told(late, "delay")[0]
 
 
 COULOMB = Coulomb(Fc=2.0, sigma2=1.0)

@@ -25,7 +25,6 @@ from cosim.estimation.problem import Problem
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Cogging
 from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.base import Motion
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
@@ -156,25 +155,6 @@ def test_the_error_twice_a_turn_of_half_the_turns_is_the_error_that_was_found(
         np.testing.assert_allclose(got if whole else got[30], error if whole else error[30], rtol=0, atol=1e-12)
 
 
-def test_the_two_starts_differ_in_the_sign_of_the_error_once_a_turn() -> None:
-    disc = EncoderEccentricity(cycles_per_rev=12.0, amplitude_rad=3e-4, phase=0.8)
-    one, other = (first_harmonic(each) for each in halved(problem(0.0, "rotary"), disc))
-    np.testing.assert_allclose(one, -other, rtol=0, atol=1e-12)
-    assert np.abs(one).max() == pytest.approx(1.5e-4, rel=1e-2)
-
-
-def first_harmonic(disc: EncoderEccentricity) -> np.ndarray:
-    angle = np.linspace(-1, 1, 201)
-    motion = SimpleNamespace(angle=angle)
-    read = [float(disc.reading(0.0, _at(motion, k))) for k in range(len(angle))]
-    return np.array(read) - twice_a_turn(disc, angle)
-
-
-def _at(motion: Any, k: int) -> Motion:
-    found: Any = SimpleNamespace(angle=float(motion.angle[k]))
-    return found  # type: ignore[no-any-return]
-
-
 def test_an_axis_that_turns_has_whole_turns_and_at_least_one() -> None:
     for cycles, turns in ((1.0, 1.0), (5.0, 2.0), (7.0, 4.0), (12.0, 6.0)):
         disc = EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=3e-4)
@@ -213,13 +193,6 @@ def likeliest(play: Backlash) -> Backlash:
     start = best.candidate.start(best.coefficients)
     assert isinstance(start, Backlash)
     return start
-
-
-@PLAYS
-def test_the_likeliest_candidate_has_the_gap_and_what_stops_the_far_side(play: Backlash) -> None:
-    start = likeliest(play)
-    assert start.gap_rad == pytest.approx(play.gap_rad, rel=0.05)
-    assert start.load_friction / start.load_share == pytest.approx(play.load_friction / play.load_share, rel=0.1)
 
 
 @PLAYS

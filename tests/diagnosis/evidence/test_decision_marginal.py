@@ -48,19 +48,6 @@ def start(noise: Array = NOISE, sizes: Array = SIZE) -> Marginal:
     return Marginal(0.0, noise, sizes, np.zeros(4))
 
 
-def test_where_every_row_counts_it_is_the_density_of_the_data_with_the_prior_of_the_sizes() -> None:
-    drawn = bands()
-    one = found(drawn, start=start(), rounds=0)
-    prior = np.diag(np.array([2.0, 0.5, 0.7, 0.7]) ** 2)
-    x = np.concatenate([x for _, x in drawn])
-    y = np.concatenate([y for y, _ in drawn])
-    covariance = np.diag(np.repeat(NOISE, ROWS)) + x @ prior @ x.T
-    density = -(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1]) / 2
-    assert one.log_likelihood == pytest.approx(density - (0.7 / 0.5) ** 2 / 2, rel=1e-9)
-    assert one.beta == pytest.approx(prior @ x.T @ np.linalg.solve(covariance, y), rel=1e-9)
-    assert (one.noise.tolist(), one.sizes.tolist()) == (NOISE.tolist(), SIZE.tolist())
-
-
 def test_noise_and_sizes_that_are_renewed_explain_the_data_better_and_come_near_the_truth() -> None:
     true = np.array([0.25, 4.0])
     drawn = bands(noise=true, rows=(4000, 4000))
@@ -103,6 +90,45 @@ def test_priors_without_bound_are_numbers_all_the_same() -> None:
     told = found(bands(), free=np.array([1e300, 1e-300, 1.0, 1.0]))
     assert np.isfinite(told.log_likelihood)
     assert abs(told.beta[1]) < 1e-12
+
+
+def dense(
+    grams: Array, free: Array, group: Group, size: float, count: Array, effective: Array, floor: Array
+) -> tuple[float, Array, Array]:
+    """`marginal` without its rounds: noise and sizes as they begin, by inverses and determinants."""
+    noise = np.maximum(grams[:, 0, 0] / count, floor)
+    variance = np.square(free)
+    variance[group.columns] = max(size, 1e-6 * group.prior) ** 2
+    weight = effective / count / noise
+    normal = np.tensordot(weight, grams[:, 1:, 1:], 1) + np.diag(1 / variance)
+    target = weight @ grams[:, 1:, 0]
+    beta = np.linalg.solve(normal, target)
+    energy = weight @ grams[:, 0, 0] - target @ beta
+    penalty = (size / group.prior) ** 2 / 2
+    sizes = np.linalg.slogdet(normal)[1] + np.log(variance).sum()
+    return -(effective @ np.log(noise) + energy + sizes) / 2 - penalty, noise, beta
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("relative", [1.0, 0.01, 1e-4, 1e-9])
+def test_a_marginal_likelihood_without_rounds_is_the_gaussian_integral(
+    compiled: bool, relative: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From sizes that are given too, down to a millionth of the prior, where a size counts as that."""
+    rng = np.random.default_rng(1)
+    bands = [rng.normal(0, 1, (50, 5)) for _ in range(2)]
+    grams = np.array([one.T @ one for one in bands])
+    count, effective, floor = np.array([50.0, 50.0]), np.array([50.0, 11.0]), np.array([1e-9, 2.0])
+    free, group = np.array([3.0, 0.5, 1.0, 1.0]), Group(np.array([2, 3]), 0.7)
+    if not compiled:
+        monkeypatch.setattr("cosim.diagnosis.evidence.marginal.library", lambda: None)
+    expected, noise, beta = dense(grams, free.copy(), group, size := relative * 0.7, count, effective, floor)
+    start = None if relative == 1.0 else Marginal(0.0, noise, np.array([size]), beta)
+    found = marginal(grams, free.copy(), [group], count, effective, floor, start, rounds=0)
+    assert found.log_likelihood == pytest.approx(expected, rel=1e-8)
+    np.testing.assert_allclose(found.noise, noise)
+    np.testing.assert_allclose(found.beta, beta, rtol=1e-7, atol=1e-14)
+    np.testing.assert_allclose(found.sizes, [size])
 
 
 # Nuisances of a comparison: how many there are, and that holes in time do not make more of them.

@@ -11,7 +11,6 @@ from bounds import Stand, case, drawn
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.effects import candidates, hypothesis_of
-from cosim.diagnosis.effects.base import Seen
 from cosim.diagnosis.effects.candidates import columns_of, span_of
 from cosim.diagnosis.measure.bounds import SeenFrom, _absent
 from cosim.diagnosis.measure.bounds import tested as seen_from
@@ -111,16 +110,6 @@ def test_forms_that_no_number_of_a_bound_tells_apart_share_the_hardest_ones(hard
     assert bound.power == 1.0
 
 
-@pytest.mark.parametrize(("nameless", "last"), [(9.0, 30.0), (40.0, 20.0), (30.0, 10.0)])
-def test_the_bound_of_a_resonance_ends_before_what_would_not_be_called_a_spring(nameless: float, last: float) -> None:
-    spring = next(one for one in stand().members() if one.effect == "compliance")
-    places = (10.0, 20.0, 30.0, 40.0)
-    members = [replace(spring, place=place, directions=(np.ones(1),), has_name=place != nameless) for place in places]
-    hidden = Hidden("compliance", np.array([0.0]), np.ones(1), 0.0)
-    (bound,) = seen_from(Deaf(), {"compliance": [(one, hidden) for one in members]}).values()  # type: ignore[arg-type]
-    assert (bound.size, bound.places) == (last, (10.0, last))
-
-
 def test_of_a_knee_all_that_it_takes_is_concealed() -> None:
     here = stand()
     knee = next(one for one in here.members() if one.effect == "torque_saturation")
@@ -164,7 +153,6 @@ def test_one_that_is_found_alone_is_the_bound_and_none_has_none() -> None:
 # What a bound says of itself: for which members of its kind it holds, and where the band ends its knowledge.
 
 ROTARY = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
-LINEAR = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0), motion="linear")
 WAVES = (
     Cogging(cycles_per_rev=9.0, amplitude=0.1),
     PeriodicFriction(cycles_per_rev=9.0, relative_amplitude=0.1),
@@ -178,32 +166,12 @@ TONE = PeriodicDisturbance(frequency_hz=9.0, amplitude=0.1)
 CUTOFF, SPEED = 20.0, 2.0
 
 
-def told(effect: Effect, low: float, high: float, mount: Mount = ROTARY) -> str:
-    return hypothesis_of(effect).looked(Seen(0.1, low, high, CUTOFF), mount)
-
-
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
     """An axis that goes to and fro at one speed, 10 rad each way."""
     t = np.arange(4000) / 200
     q = 10 - np.abs(SPEED * t % 20 - 10)
     return prepare([Recording("run", {"t": t, "tau": np.sign(np.gradient(q)), "q": q})], CUTOFF)
-
-
-@pytest.mark.parametrize("effect", WAVES, ids=lambda one: one.id)
-def test_waves_over_position_are_told_between_two_cycles_and_are_not_testable_above(effect: Effect) -> None:
-    assert told(effect, 1.5, 53.333) == "at 1.5 to 53.3 cycles a turn; not testable above"
-    assert told(effect, 8.0, 8.0) == "at 8 cycles a turn; not testable above"
-    assert told(effect, 31.4159, 2412.7, LINEAR) == "at 31.4 to 2413 cycles a metre; not testable above"
-
-
-@pytest.mark.parametrize("effect", SPRINGS, ids=lambda one: type(one).__name__)
-def test_a_spring_is_told_below_a_resonance_and_is_not_testable_above(effect: Effect) -> None:
-    assert told(effect, 6.0, 17.284) == "with a resonance below 17.3 Hz; not testable above"
-
-
-def test_a_tone_is_told_between_two_frequencies_and_is_not_testable_above_the_band() -> None:
-    assert told(TONE, 0.613, 15.96) == "between 0.61 and 16 Hz; not testable above 20 Hz"
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """When a fitted effect is none: on motions of which every number is known."""
 
+import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,13 +16,13 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search import admissibility
-from cosim.diagnosis.search.admissibility import in_time, is_degenerate, name_rules, needs_turns
+from cosim.diagnosis.search.admissibility import _way_back, in_time, is_degenerate, name_rules, needs_turns
 from cosim.diagnosis.search.commanded import is_asked_for
 from cosim.diagnosis.search.stages import admission, refitted, weighed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
-from cosim.estimation.residuals import away_from_turns, gets_memory
+from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
 from cosim.estimation.row_weights import weights
 from pyfmi_models.effects import Delay, TorqueOffset
 from pyfmi_models.effects.compliance import LoadSideCompliance
@@ -325,3 +326,39 @@ def test_a_contact_settles_by_less_than_twice_its_level_and_more_than_that_wande
     problem = Problem(PLAIN, prepared, weights(PLAIN.friction, prepared), 1 / 200)
     effect = DwellBreakaway(torque_per_efold=rise * FC, memory_rad=0.01)
     assert is_degenerate(problem, effect) is not settles
+
+
+# What formulas of admissibility are, by hand.
+
+
+@pytest.mark.parametrize(
+    ("q", "back"),
+    [([0.0, 1.0, 2.0], 0.0), ([0.0, 2.0, 1.5, 3.0], 0.5), ([0.0, -2.0, -1.0, -4.0], 1.0), ([1.0, 0.0, 3.0, 1.0], 2.0)],
+)
+def test_the_way_back_is_the_longest_against_the_way_that_a_motion_goes(q: list[float], back: float) -> None:
+    assert _way_back(np.array(q)) == back
+    assert _way_back(-np.array(q)) == back
+
+
+@pytest.mark.parametrize("rows", [9, 10])
+def test_at_rest_counts_from_ten_rows_on_and_only_where_the_law_says_nothing(rows: int) -> None:
+    weight = np.concatenate([np.ones(30), np.zeros(rows)])
+    left, without = np.full(30 + rows, 0.5), np.full(30 + rows, 2.0)
+    assert removed_at_rest(weight, left, without) == (1 - 0.25 / 4 if rows == 10 else 1.0)
+    assert removed_at_rest(weight, without, left) == (1 - 4 / 0.25 if rows == 10 else 1.0)
+
+
+@pytest.mark.parametrize(("removed", "told"), [(0.019, False), (0.021, True)])
+def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(
+    removed: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a hundred rows the last half are about turns; all is removed there."""
+    far = np.repeat([1.0, 0.0], 50)
+    monkeypatch.setattr("cosim.estimation.residuals.far_from_turns", lambda _: far)
+    problem: Any = SimpleNamespace(prepared=None)
+    without, left = np.ones(100), np.ones(100)
+    left[50:] = math.sqrt(1 - 2 * removed)
+    assert away_from_turns(problem, left, without) == pytest.approx(0.0 if told else 1.0, abs=1e-9)
+    if told:
+        left[:50] = math.sqrt(1 - removed)
+        assert away_from_turns(problem, left, without) == pytest.approx(1 / 3, rel=1e-9)

@@ -37,7 +37,6 @@ class Held(Tables):
     weight = np.ones(4)
 
     def __init__(self, nats: Mapping[str, float], errors: Mapping[str, float] | None = None) -> None:
-        super().__init__()
         self.nats, self.errors = nats, errors or {}
 
     def predicted(self, found: Fitted) -> float:
@@ -139,12 +138,6 @@ def test_of_two_ways_that_halve_the_error_one_that_halves_what_the_other_leaves_
 
     assert (left(0.2), left(0.3)) == ("y", "x")
     assert (left(0.1, 860.0), left(0.04, 860.0)) == ("x", "y"), "the likelihood contradicts, unless hardly any is left"
-
-
-def test_what_stands_alone_is_not_fitted_again() -> None:
-    tables = Held({"b": 0.0, "bx": 10.0})
-    assert standing(proven(tables, "x")) == "x"
-    assert tables.fitted == []
 
 
 @pytest.mark.parametrize(

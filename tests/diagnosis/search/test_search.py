@@ -17,12 +17,9 @@ from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.rivals import refitted_from_here
 from cosim.diagnosis.search.stages import (
     CandidateFit,
-    InTurn,
-    Start,
     best_of,
     contest,
     holds_at_rest,
-    is_hopeful,
     is_small,
     least,
     refitted,
@@ -125,34 +122,6 @@ def test_a_rival_is_fitted_from_where_the_others_stand_too_as_alone_they_may_hav
     assert found.evidence > stuck.evidence + 100
     assert found.fit.rms < 0.2 * stuck.fit.rms
     assert refitted_from_here(comparison, alone.mount, alone, found) is found
-
-
-def test_an_effect_that_stands_is_not_fitted_once_more_beside_the_others_and_is_one_of_what_was_tried() -> None:
-    """What was fitted in one structure is the same fit beside that structure without it."""
-
-    class Spy(InTurn):
-        def __call__(self, comparison: Comparison, current: Fit, worth: Sequence[Start]) -> list[CandidateFit]:
-            asked.append([effect.name for effect, _ in worth])
-            return []
-
-    asked: list[list[str]] = []
-    comparison, base = compared(lambda q, _: 0.15 * np.sin(q + 0.3))
-    effect, many = starts(comparison.screen(base), comparison.policy)[0]
-    stands = replace(refitted(comparison, base, effect, many), is_rough=False)
-    stage(comparison, base, Spy())
-    assert effect.name in asked[0]
-    assert stage(comparison, base, Spy(), stands).tried == (stands,)
-    assert asked[1] == [one for one in asked[0] if one != effect.name]
-
-
-def test_a_step_that_promises_nothing_by_either_statistic_is_not_refitted() -> None:
-    comparison, base = compared(lambda q, _: 0.1 * LEVEL * np.sin(40 * q))
-    screened = comparison.screen(base)
-    hopeless = {one.form for one in screened} - {one.form for one in screened if is_hopeful(one, POLICY)}
-    chosen = [type(effect) for effect, _ in starts(screened, POLICY)]
-    assert hopeless
-    assert Cogging in chosen
-    assert not hopeless & set(chosen)
 
 
 def test_a_candidate_without_values_beside_a_structure_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,10 @@
 """What a learned term may be: its columns, its signs, its waves, its energy, the evidence it needs."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from learned_cases import FC, MOUNT, Array, Extra, learned, night, parts, wanders, warm_place
-from test_unknown import iron
+from learned_cases import FC, MOUNT, Array, Extra, iron, learned, night, parts, wanders, warm_place
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -15,37 +12,20 @@ from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.terms.dictionary import followed, further_columns, user_columns
-from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
+from cosim.diagnosis.terms.dictionary import further_columns, user_columns
+from cosim.diagnosis.terms.grams import with_terms
 from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import paths
 from cosim.diagnosis.trust.limits import own_set_point, own_torque
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Prepared, prepare
-from cosim.support.statistics import rms
-from cosim_formulas.find import since
 from pyfmi_models.effects.compliance import Compliance
-from pyfmi_models.effects.learned_base import SEEN_WITHIN
 from pyfmi_models.effects.learned_memory import LearnedHysteresis
 
 
 def gives(now: dict[str, Array]) -> Array:
     """A loop the wrong way round, as of a delay that feeds energy in."""
     return -0.3 * iron(now)
-
-
-def test_columns_of_a_term_are_what_its_coefficients_add() -> None:
-    comparison, base, _ = parts(warm_place)
-    prepared = comparison.problem.prepared
-    for term in candidate_terms(base.mount, prepared):
-        if term.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
-            columns, size = columns_of(base.mount, term, prepared), 1e-4
-            values = [size if k == 2 else 0.0 for k in range(term.count)]
-            torques = []
-            for one in (term, term.with_coefficients(values)):
-                mount, _ = with_terms(base.mount, [one])
-                torques.append(stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0])
-            np.testing.assert_allclose((torques[1] - torques[0]) / size, columns[:, 2], atol=2e-3)
 
 
 def test_the_effect_of_a_card_is_the_term_that_was_fitted() -> None:
@@ -109,23 +89,6 @@ def test_terms_need_evidence_each() -> None:
     assert paths(Scores(), range(4)) == []
 
 
-def test_a_coefficient_that_is_a_torque_is_as_large_as_the_friction_level_and_a_share_is_one() -> None:
-    """What the search takes for size one: in the unit of the torque, or relative to the level that it changes."""
-    comparison, base, _ = parts(warm_place)
-    prepared = comparison.problem.prepared
-    terms = list(candidate_terms(base.mount, prepared))[:12]
-    grams = grams_of(comparison, base, [columns_of(base.mount, one, prepared) for one in terms], terms)
-    level = rms(comparison.nuisances.level)
-    assert {one.in_torque for one in terms} == {True, False}
-    assert level > 1.5, "of 2 N m"
-    place = 0
-    for one in terms:
-        sizes = one.prior[one.prior > 0] * (level if one.in_torque else 1.0)
-        assert grams.unit[place : place + len(sizes)] == pytest.approx(sizes)
-        place += len(sizes)
-    assert place == len(grams.unit)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_candidate_that_can_only_add_is_none_where_it_would_take_away(sign: float) -> None:
     """What is left is the column itself, or that upside down, which a spring cannot be."""
@@ -142,46 +105,6 @@ def test_a_candidate_that_can_only_add_is_none_where_it_would_take_away(sign: fl
     assert (spring.evidence, spring.plain) == (
         (free.evidence, free.plain) if free.coefficients[0] > 0 else (-np.inf, 0)
     )
-
-
-# What a learned term may follow along a motion: acceleration, way, and what has passed since the speed turned.
-
-DT = 1e-3
-T = DT * np.arange(8001)
-
-
-def moving(q: np.ndarray, v: np.ndarray) -> Any:
-    return SimpleNamespace(t=T, dt=DT, q=q, v=v)
-
-
-def test_the_acceleration_is_that_of_the_motion_behind_a_short_lag() -> None:
-    """Of a speed that grows evenly it is exact once the lag is over; of a sine it is that of a first order."""
-    assert followed("acceleration", moving(T**2, 2 * T))[-1] == pytest.approx(2.0, rel=1e-3)  # half a row early
-    w = 3.0
-    found = followed("acceleration", moving(-np.cos(w * T) / w, np.sin(w * T)))
-    gain, late = 1 / np.hypot(1, w * SEEN_WITHIN), np.arctan(w * SEEN_WITHIN)
-    np.testing.assert_allclose(found[2000:], w * gain * np.cos(w * T[2000:] - late), atol=0.005)
-
-
-def test_the_way_grows_whichever_way_the_axis_moves() -> None:
-    found = followed("way", moving(0.5 * np.sin(T), 0.5 * np.cos(T)))
-    assert found[0] == 0
-    assert np.all(np.diff(found) >= 0)
-    quarter = np.searchsorted(T, np.pi / 2)
-    assert found[quarter] == pytest.approx(0.5, abs=1e-4)
-    assert found[np.searchsorted(T, 3 * np.pi / 2)] == pytest.approx(1.5, abs=1e-4)
-
-
-def test_time_and_way_count_from_the_last_reversal_or_the_start() -> None:
-    piece = moving(0.5 * np.sin(T), 0.5 * np.cos(T))
-    turned = np.searchsorted(T, np.pi / 2)
-    time, way = since("time since reversal", piece), since("way since reversal", piece)
-    for k in (500, 1500):
-        assert (time[k], way[k]) == (pytest.approx(T[k]), pytest.approx(0.5 * np.sin(T[k])))
-    assert time[turned] == pytest.approx(0.0, abs=1.5 * DT)
-    for k in (turned + 400, turned + 2500):
-        assert time[k] == pytest.approx(T[k] - np.pi / 2, abs=1.5 * DT)
-        assert way[k] == pytest.approx(0.5 * (1 - np.sin(T[k])), abs=1e-5)
 
 
 # A column that is the axis' own torque, commanded or read elsewhere, is no cause; that of a cause stays one.

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from learned_cases import FC, Array, Extra, droop, learned, parts, recording, swerve, teeth, wanders, warm_place
-from test_unknown import iron
+from learned_cases import FC, Array, Extra, droop, iron, learned, parts, recording, swerve, teeth, wanders, warm_place
 
 from cosim.delivery.deliver import as_json, deliver_quickly
 from cosim.delivery.proposal import Proposal

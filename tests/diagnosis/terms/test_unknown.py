@@ -51,15 +51,6 @@ def kick(now: dict[str, Array]) -> Array:
     return 2.0 * direction * np.exp(-(now["t"] - now["t"][turned]) / 0.5)
 
 
-def iron(now: dict[str, Array]) -> Array:
-    """An elastic stop over 0.25 rad."""
-    state, out = 0.0, []
-    for step in np.diff(now["q"], prepend=now["q"][0]) / 0.25:
-        state = min(max(state + step, -1.0), 1.0)
-        out.append(1.0 * state)
-    return np.array(out)
-
-
 def once(now: dict[str, Array]) -> Array:
     return 1.2 * np.exp(-(((now["t"] - 12 * now["run"]) / 3) ** 2)) * (-1) ** now["run"]
 
@@ -73,14 +64,12 @@ def rubs(now: dict[str, Array]) -> Array:
     [
         (lambda now: 20.0 * np.abs(now["a"]) * now["v"], "acceleration and speed"),
         (kick, "time since reversal"),
-        (iron, "hysteresis over a long stroke"),
-        (lambda now: 0.3 * now["q"] * (now["temperature"] - 20) * np.sign(now["v"]), "position and temperature"),
         (lambda now: 0.08 * (now["temperature"] - 20), "temperature"),
         (lambda now: 0.7 * np.sin(9 * now["q"]), "position"),
         (once, "time"),
         (rubs, "friction level over time"),
     ],
-    ids=["acceleration", "kick", "iron", "tilt", "warmth", "teeth", "once", "rubbing"],
+    ids=["acceleration", "kick", "warmth", "teeth", "once", "rubbing"],
 )
 def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_with: str) -> None:
     _, decision = left(extra)
