@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cosim.data.order import LATE, order_of
 from cosim.data.recording import Recording
-from cosim.support.errors import ManyRecordingsError, RecordingError
+from cosim.support.errors import RecordingError
 
 ROWS = 1500
 T = np.arange(ROWS) / 1000
@@ -133,17 +133,6 @@ def test_a_register_of_time_goes_on(bits: int, tick: float, signed: bool, each: 
     assert len(ordered.done) == int((np.diff(read) < 0).any())
 
 
-def test_microseconds_of_32_bits_with_copies_and_late_rows_go_on(tmp_path: Path) -> None:
-    ticks = (np.arange(2500) * 1000 + 2**32 - 700_000) % 2**32
-    rows = np.insert(np.arange(2500), 900, 899)
-    rows[[700, 701]] = rows[[701, 700]]  # just where it begins again
-    t = np.arange(2500) / 1000
-    one = Recording.read(written(tmp_path / "run.csv", at(rows, {"micros": ticks} | columns(t))))
-    np.testing.assert_allclose(one.t - one.t[0], t, atol=1e-6)
-    np.testing.assert_allclose(one["q"], columns(t)["q"], rtol=1e-9)
-    assert '"micros" begins again at 4,294,967,296; it was continued.' in one.notes[0]
-
-
 @settings(max_examples=60, deadline=None)
 @given(first=st.integers(200, 1400), seed=SEEDS, phase=st.floats(0.5, 5.5), start=st.floats(0, 2))
 def test_a_logger_that_was_started_anew_made_two_recordings(first: int, seed: int, phase: float, start: float) -> None:
@@ -170,21 +159,3 @@ def test_a_clock_that_was_set_back_is_never_sorted(back: float, row: int) -> Non
     if (np.diff(t) < 0).any():
         with pytest.raises(RecordingError, match="time runs backwards"):
             Recording.of({"t": t} | columns(T))
-
-
-def test_recordings_below_each_other_are_still_listed(tmp_path: Path) -> None:
-    """Both begin with the same row, and have a copy each."""
-    one, two = table(T, 1), table(T, 2, 1.0)
-    two["tau"][0], two["q"][0] = one["tau"][0], one["q"][0]
-    rows = np.insert(np.arange(ROWS), 10, 9)
-    both = {name: np.concatenate([one[name][rows], two[name][rows]]) for name in one}
-    path = written(tmp_path / "day.csv", both)
-    with pytest.raises(ManyRecordingsError, match="These are 2 recordings"):
-        Recording.read(path)
-    np.testing.assert_allclose(Recording.read(f"{path}:#2")["q"], two["q"], rtol=1e-9)
-
-
-def test_a_time_of_too_few_digits_is_still_asked_for_its_period(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", table(T) | {"t": np.floor(T * 250) / 250})
-    with pytest.raises(RecordingError, match="written with too few digits"):
-        Recording.read(path)

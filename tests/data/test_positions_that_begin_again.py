@@ -260,13 +260,3 @@ def test_a_converter_of_coarse_steps_fills_a_register_in_threes_and_twos() -> No
     coarse = np.rint(2.69 * np.rint(TAU / 2.69))
     table, _ = continued("run", {"tau": np.where(coarse < 0, coarse + 65536, coarse)}, {})
     np.testing.assert_array_equal(table["tau"], coarse)
-
-
-def test_a_recording_is_read_so_and_says_it() -> None:
-    read = np.where(TAU < 0, TAU + 65536, TAU)
-    made = Recording.of(
-        {"t": TIMES, "tau": read, "q": np.rad2deg(np.mod(Q, 2 * np.pi))}, units={"q": "deg", "tau": "mN.m"}
-    )
-    np.testing.assert_allclose(made["tau"], 1e-3 * TAU, atol=1e-12)
-    np.testing.assert_allclose(made["q"] - made["q"][0], Q - Q[0], atol=1e-9)
-    assert len(made.notes) == 2

@@ -37,9 +37,9 @@ def spoiled(recording: Recording, column: str, rows: slice, values: object) -> R
     return replace(recording, table=table)
 
 
-@pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
-@pytest.mark.parametrize("step", [0.0, 1e-5, 3e-4, 3e-3, 3e-2])
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4])
+@pytest.mark.parametrize("rate", [50.0, 1000.0])
+@pytest.mark.parametrize("step", [0.0, 1e-5, 3e-3])
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_a_clean_recording_is_returned_as_it_is(rate: float, step: float, noise: float) -> None:
     recording = motion(step, noise, rate)
     assert cleaned(recording) is recording
@@ -53,8 +53,8 @@ def test_a_generated_recording_with_stops_and_impacts_is_returned_as_it_is(effec
         assert cleaned(recording) is recording
 
 
-@pytest.mark.parametrize("row", [0, 3, 424, 5000, 9999])
-@pytest.mark.parametrize("rows", [1, 2, 3])
+@pytest.mark.parametrize("row", [0, 424, 9999])
+@pytest.mark.parametrize("rows", [1, 3])
 @pytest.mark.parametrize("step", [0.0, 3e-3])
 def test_a_false_position_is_bridged_to_within_the_encoder(row: int, rows: int, step: float) -> None:
     good = motion(step)

@@ -230,13 +230,3 @@ def test_an_fmu_that_refuses_an_input_at_the_start_is_named(make: Make) -> None:
     sentence = r"once returned an error at tick 0 \(0 s\), in initialisation mode; its last inputs: u = "
     with pytest.raises(StepError, match=sentence):
         started(fmus, [("b.y", "once.u"), ("once.y", "b.u")], {"y": "once.y"})
-
-
-def test_delays_after_the_start_are_those_of_the_algorithm(make: Make) -> None:
-    """At tick 0 the chain has met its inputs; from then on each component of it delays by a step."""
-    fmus = {"one": make("gain"), "two": make("gain")}
-    record = {"one": "one.y", "two": "two.y"}
-    rows = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    run = started(fmus, [("r", "one.u"), ("one.y", "two.u")], record, signals={"r": rows})
-    np.testing.assert_array_equal(run.recording["one"], [1, 1, 2, 3, 4])
-    np.testing.assert_array_equal(run.recording["two"], [1, 1, 1, 2, 3])

@@ -56,18 +56,6 @@ def test_an_integrator_with_feedback_follows_its_closed_form(tiny: Tiny, version
     np.testing.assert_allclose(run.recording["y"], 1 - (1 - 4e-3) ** np.arange(2000), rtol=1e-12, atol=1e-15)
 
 
-@VERSIONS
-def test_an_impulse_takes_one_tick_through_each_component(tiny: Tiny, version: int) -> None:
-    impulse = np.zeros(20)
-    impulse[5] = 1.0
-    columns = {"r": "controller.a", "tau": "controller.y", "drive": "plant.a", "q": "plant.y"}
-    wires = [("r", "controller.a"), ("controller.y", "plant.a")]
-    two = {"plant": tiny[version], "controller": tiny[version]}
-    run = simulate(two, wires, record=columns, step=0.1, ticks=20, signals={"r": impulse}, parameters=CONTROL)
-    first = {name: int(np.flatnonzero(run.recording[name])[0]) for name in columns}
-    assert first == {"r": 5, "tau": 6, "drive": 6, "q": 7}
-
-
 @pytest.mark.parametrize("decimation", [1, 2, 3, 10])
 def test_fmi_2_and_3_and_the_loops_in_c_and_python_give_the_same_bits(tiny: Tiny, decimation: int) -> None:
     assert cosim.master.loop.library() is not None, "run `python cosim/master/loop/build_hook.py` first"

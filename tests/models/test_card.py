@@ -1,11 +1,9 @@
 """Cards come back as they were written, and make the plants that they describe."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from effect_examples import EXAMPLES
-from imports import PACKAGES
 
 from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
 from pyfmi_models.card_writer import card_text
@@ -160,16 +158,6 @@ def test_defaults_are_those_that_the_contract_states() -> None:
     assert card.friction == Coulomb(Fc=1.0, sigma2=0.0)
     assert (card.mount.motion, card.controller, card.unbalance, card.effects) == ("rotary", None, None, ())
     assert (card.encoder.counts_per_rev, card.encoder.noise_rms, card.encoder.ratio) == (0, 0, 1)
-
-
-def test_the_noise_of_the_encoder_is_kept_for_people_and_read_by_nothing_as_the_guide_says() -> None:
-    card = parse_card(SMALL + "[encoder]\nnoise_rms = 2e-7\n", "c")
-    assert parse_card(card_text(card), "again").encoder.noise_rms == 2e-7
-    root = Path(__file__).parents[2]
-    sources = [one for room in PACKAGES for one in (root / room).rglob("*.py")]
-    assert sources
-    assert [one.name for one in sources if ".noise_rms" in one.read_text("utf-8")] == []
-    assert "enters no calculation" in (root / "docs" / "card.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("Vs", ["", "Vs = 0.04\n"])

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from tiny_fmu import described, description
 from cosim.fmi.description import describe
 from cosim.fmi.variables import ports_of, variables_of
 from cosim.master.simulate import run
-from cosim.models.cache import with_fmus
 from cosim.support.errors import FmuError, ScenarioError, WiringError
 from cosim.system.scenario import parse_scenario
 
@@ -109,21 +107,6 @@ def test_a_mistake_in_the_mapping_names_key_and_choices(tiny: dict[int, Path], t
     foreign(tiny[2], tmp_path / "theirs.fmu")
     with pytest.raises(FmuError, match=r'"plant.kk" does not exist; what can be set: .*Gain\[1\]'):
         run(scenario(f'fmu = "theirs.fmu"\n{MAPPING}\nparameters = {{ kk = 1 }}', tmp_path, tiny))
-
-
-@pytest.mark.parametrize(("interface", "tolerance"), [("co-simulation", 0.0), ("model-exchange", 1e-7)])
-def test_the_shipped_scenario_runs_with_a_plant_of_other_names(interface: str, tolerance: float) -> None:
-    """The plant of the card from outside: the wires of `sidereal` stay as they are."""
-    text = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.1")
-    wanted = with_fmus(parse_scenario(text, "sidereal", Path()))
-    own = '[components.mount]\ncard = "paper_mount"\npart = "plant"\n'
-    assert own in text
-    renamed = 'variables = { position = "q", q = "position", speed = "v", v = "speed" }'
-    plant = f'[components.mount]\nfmu = "{wanted.components["mount"].fmu}"\ninterface = "{interface}"\n{renamed}\n'
-    theirs = with_fmus(parse_scenario(text.replace(own, plant), "theirs", Path()))
-    ours, found = run(wanted).recording, run(theirs).recording
-    for name in ours:
-        np.testing.assert_allclose(found[name], ours[name], rtol=0, atol=tolerance * np.abs(ours[name]).max())
 
 
 def test_an_array_has_our_name_whole_and_by_element(mirror: dict[int, Path]) -> None:

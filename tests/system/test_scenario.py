@@ -173,12 +173,6 @@ def test_what_a_scenario_does_not_say_of_its_algorithm_stays_as_it_is() -> None:
 
 # A reference to a port is one type with one reader, from a scenario's text to the plan.
 
-SPLIT = '.partition(".")'
-ROOT = Path(__file__).parents[2]
-SPEAK_OF_PORTS = (*(f"cosim/{one}" for one in ("system", "master", "hardware", "sweeps")), "cosim_observatory")
-SPLITS = {"ports.py": 2, "reading.py": 1}
-"""The reader itself, and the number of the standard that an SSP names."""
-
 
 @pytest.mark.parametrize(
     ("text", "owner", "port"),
@@ -206,8 +200,3 @@ def test_wires_and_records_take_texts_and_hold_references() -> None:
     assert repr(Record("q")) == "Record(signal='q', mode='sample')"
     with pytest.raises(TypeError, match="target"):
         Wire("controller.tau")  # type: ignore[call-arg]
-
-
-def test_no_other_module_takes_a_reference_apart_by_hand() -> None:
-    for path in (path for folder in SPEAK_OF_PORTS for path in (ROOT / folder).rglob("*.py")):
-        assert path.read_text("utf-8").count(SPLIT) <= SPLITS.get(path.name, 0), path

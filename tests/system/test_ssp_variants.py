@@ -4,7 +4,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from commands import call
 from ssp_files import SPACES, component, pack, real, system, values, wire
 
 from cosim.api.show import show
@@ -47,12 +46,6 @@ def test_another_system_of_an_archive_is_chosen_by_its_file_or_its_name(two: Pat
 def test_a_system_that_an_archive_does_not_have_is_named_with_those_it_has(two: Path) -> None:
     with pytest.raises(ScenarioError, match=r'it has no SSD "Slow\.ssd"; there are: Fast\.ssd, System'):
         read_scenario(f"{two}#Slow.ssd")
-
-
-def test_the_verbs_take_a_chosen_system(two: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for command in (["show", f"{two}#Fast.ssd"], ["run", f"{two}#Fast.ssd", "--out", str(tmp_path / "out")]):
-        assert call(*command) == 0
-    assert "one.y" in capsys.readouterr().out
 
 
 def test_in_a_folder_any_ssd_is_the_system(two: Path, tmp_path: Path) -> None:

@@ -90,12 +90,6 @@ def test_a_small_ripple_over_a_quiet_axis_is_seen_and_its_size_is_right(share: f
     assert best.effect.amplitude == pytest.approx(amplitude, rel=0.1)
 
 
-def test_where_nothing_is_missing_nothing_has_evidence() -> None:
-    comparison, base = compared(lambda q, _: 0 * q)
-    best = best_of(comparison, stage(comparison, base))
-    assert best is None
-
-
 def test_what_is_slow_counts_beside_loud_fast_noise() -> None:
     rng = np.random.default_rng(4)
     comparison, base = compared(lambda q, _: 0.15 * np.sin(q + 0.3) + 0.5 * rng.standard_normal(len(q)))
