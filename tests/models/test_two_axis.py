@@ -10,17 +10,13 @@ import pytest
 from effect_examples import evaluate
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from scipy.integrate import solve_ivp
-from simulating import simulate
 
 import cosim.models.cache
 from cosim.data.star import SIDEREAL_RATE
 from cosim.master.simulate import run
 from cosim.support.errors import FmuError, ScenarioError
 from cosim.system.scenario import parse_scenario, read_scenario
-from pyfmi_models.card import read_card
 from pyfmi_models.effects.alt_az import AltitudeInertia, AzimuthCentrifugal
-from pyfmi_models.export import export_fmu
 from pyfmi_models.friction.coulomb import Frictionless
 from pyfmi_models.model import Model
 from pyfmi_models.mount import Axis, Mount
@@ -86,44 +82,6 @@ def test_energy_changes_by_the_work_of_the_torques_alone(
     assert (ends[1] - ends[0]) / (2 * h) == pytest.approx(power, abs=1e-6)
 
 
-@pytest.fixture(scope="module")
-def free(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both axes without friction, as FMUs."""
-    folder = tmp_path_factory.mktemp("axes")
-    return {model.name: export_fmu(model, folder / f"{model.name}.fmu") for model in axes()}
-
-
-def swing(free: dict[str, Path], step: float) -> np.ndarray:
-    """Let both axes go for 2 s: altitude, azimuth rate and altitude rate at the end."""
-    wires = [
-        ("altitude_plant.q", "azimuth_plant.altitude"),
-        ("altitude_plant.v", "azimuth_plant.altitude_rate"),
-        ("azimuth_plant.v", "altitude_plant.azimuth_rate"),
-    ]
-    done = simulate(
-        free,
-        wires,
-        record={"h": "altitude_plant.q", "v": "azimuth_plant.v", "w": "altitude_plant.v"},
-        step=step,
-        ticks=round(2 / step) + 1,
-        parameters={"azimuth_plant": {"speed": 0.8}, "altitude_plant": {"position": 0.9, "speed": 0.5}},
-    ).recording
-    return np.array([done[name][-1] for name in "hvw"])
-
-
-def test_two_fmus_swing_as_one_body_does_to_the_order_of_their_coupling(free: dict[str, Path]) -> None:
-    def rates(_: float, state: np.ndarray) -> list[float]:
-        h, v, w = state
-        inertia = ZENITH_INERTIA + TUBE * cos(h) ** 2
-        return [w, TUBE * sin(2 * h) * w * v / inertia, -TUBE * sin(2 * h) * v**2 / 2 / TUBE_INERTIA]
-
-    exact = solve_ivp(rates, (0, 2), [0.9, 0.8, 0.5], rtol=1e-12, atol=1e-12).y[:, -1]
-    assert energy(*exact) == pytest.approx(energy(0.9, 0.8, 0.5), rel=1e-10)
-    errors = [np.abs(swing(free, step) - exact).max() for step in (4e-3, 2e-3, 1e-3)]
-    assert errors[2] < 2e-4
-    np.testing.assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 2, rtol=0.05)
-
-
 # The scenario
 
 
@@ -151,15 +109,6 @@ def test_the_shipped_scenario_keeps_the_star_within_four_arcsec_of_gusts(
     assert error.max() < 4
     assert table["azimuth_position"][0] == table["azimuth_q_d"][0]
     assert table["azimuth_v"][0] == pytest.approx(SIDEREAL_RATE * cos(pi / 4) / sin(np.radians(4)), rel=1e-3)
-
-
-@pytest.mark.parametrize("name", ["altaz_azimuth", "altaz_altitude"])
-def test_the_cards_of_the_two_axes_say_how_they_are_coupled(name: str) -> None:
-    card = read_card(name)
-    (effect,) = (one for one in card.effects if one.id in ("altitude_inertia", "azimuth_centrifugal"))
-    assert effect.tube_inertia == TUBE  # type: ignore[attr-defined]
-    assert card.mount.inertia == {"altaz_azimuth": ZENITH_INERTIA, "altaz_altitude": TUBE_INERTIA}[name]
-    assert effect.statement().endswith(".")
 
 
 # Start values from signals, models without a card

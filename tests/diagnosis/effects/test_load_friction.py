@@ -13,7 +13,7 @@ from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
 from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.diagnosis.search.sizes import Numbers
-from cosim.diagnosis.search.stages import Stage, best_of, refitted
+from cosim.diagnosis.search.stages import refitted
 from cosim.estimation.fit import Fit
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects import Motion
@@ -99,16 +99,6 @@ def test_a_gear_is_told_from_a_drive_that_gives_less_and_by_the_side_that_feels_
     assert right.effect.coulomb_per_Nm == pytest.approx(0.15, rel=0.1)  # type: ignore[attr-defined]
     assert right.evidence > max(wrong.evidence, drive.evidence) + POLICY.clear
     assert not is_degenerate(problem, right.effect)
-
-
-@pytest.mark.parametrize(("rise", "seen"), [(0.06, True), (0.002, False)])
-def test_what_is_above_such_a_bound_is_found_with_its_size_and_far_below_it_is_not(rise: float, seen: bool) -> None:
-    comparison, base = compared(4.0, rise)
-    one = refitted(comparison, base, LoadDependentFriction(coulomb_per_Nm=0.01), 2)
-    best = best_of(comparison, Stage(base, (one,)))
-    assert (best is not None) is seen
-    if seen:
-        assert one.effect.coulomb_per_Nm == pytest.approx(rise, rel=0.15)  # type: ignore[attr-defined]
 
 
 def test_the_rise_is_told_beside_the_level_that_was_fitted_not_beside_the_one_the_fit_began_with() -> None:

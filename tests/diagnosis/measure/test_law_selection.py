@@ -88,14 +88,6 @@ def test_where_one_fold_holds_all_rows_that_count_nothing_is_predicted_and_no_la
     assert proposed_law(weighed, weighed.fit(this.mount, 10)) == KEPT
 
 
-def test_rows_that_do_not_count_in_one_fold_hide_no_row_of_elements_in_the_others() -> None:
-    this = problem(LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1), row_of_elements)
-    rest = np.ones(len(this.weight))
-    rest[np.concatenate(Blocks.of(this.prepared).rows[1::FOLDS])] = 0.0
-    weighed = replace(this, weight=rest)
-    assert proposed_law(weighed, weighed.fit(this.mount, 10))["proposed"] == "maxwell_slip"
-
-
 def test_a_recording_of_one_block_predicts_nothing_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocks, "FEWEST", 1)  # else even a short one has several
     t = np.arange(3_000) / 1000
