@@ -79,8 +79,3 @@ def test_an_acceleration_that_agrees_or_is_of_another_axis_asks_nothing(tmp_path
     for other in (A, np.sin(11 * T), np.roll(A, 200)):
         path = written(tmp_path / "run.csv", "time_s,torque_Nm,position_rad,acc_rad_s2", T, TAU, Q, other)
         assert "acc_rad_s2" in Recording.read(path)
-
-
-def test_a_prefix_at_the_end_of_a_name_counts(tmp_path: Path) -> None:
-    seen = Recording.read(written(tmp_path / "run.csv", "time,force_kN,position_mm", T, TAU, 1e3 * Q))
-    np.testing.assert_allclose(seen["tau"], 1e3 * TAU, rtol=1e-6, atol=1e-3)

@@ -32,22 +32,11 @@ def test_a_share_of_the_rated_torque_is_asked_for(tmp_path: Path, name: str, sta
     np.testing.assert_allclose(Recording.read(path, units={"tau": "0.04 N.m"})["tau"], 0.04 * TAU, atol=1e-8)
 
 
-def test_an_angle_is_no_torque(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "t,tau,q", T, TAU, Q)
-    with pytest.raises(InputError, match=r"it is a torque or force, in N\.m or a unit that becomes it"):
-        read_recordings([path], {}, [], ["tau=deg"], "rotary")
-
-
 def test_a_unit_that_is_not_known_costs_nothing_where_its_column_is_not_used(tmp_path: Path) -> None:
     path = written(tmp_path / "run.csv", "t,torque [Nm],position [rad],lost motion [reference unit]", T, TAU, Q, Q)
     read = Recording.read(path)
     assert read.units.get("lost motion", "") == ""
     np.testing.assert_allclose(read["lost motion"], Q, atol=1e-8)
-
-
-def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "t,torque(0),position(0)", T, TAU, Q)
-    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -256,7 +256,16 @@ def test_a_unit_is_parted_from_a_name(header: str, name: str, unit: str) -> None
 
 @pytest.mark.parametrize(
     ("name", "unit"),
-    [("Torque_mNm", "mNm"), ("pos_deg", "deg"), ("vel_rad_s", "rad/s"), ("t_us", "us"), ("q_m", ""), ("load_A", "")],
+    [
+        ("Torque_mNm", "mNm"),
+        ("pos_deg", "deg"),
+        ("vel_rad_s", "rad/s"),
+        ("t_us", "us"),
+        ("force_kN", "kN"),
+        ("position_mm", "mm"),
+        ("q_m", ""),
+        ("load_A", ""),
+    ],
 )
 def test_a_unit_may_end_a_name(name: str, unit: str) -> None:
     assert suffixed_unit(name) == unit

@@ -64,12 +64,6 @@ def test_columns_are_renamed_and_a_name_taken_over_is_kept(tmp_path: Path) -> No
     np.testing.assert_array_equal(recording["tau"], 3 * columns()["tau"])
 
 
-def test_a_measured_speed_may_take_the_place_of_the_encoder(tmp_path: Path) -> None:
-    table = columns()
-    table["v"] = table.pop("q")
-    assert "v" in Recording.read(csv_file(tmp_path / "run.csv", table))
-
-
 def test_gaps_and_jitter_are_reported_and_left_as_they_are(tmp_path: Path) -> None:
     keep = np.r_[0:50, 60:ROWS]
     table = {name: column[keep] for name, column in columns().items()}

@@ -9,7 +9,6 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.support.errors import RecordingError
 
@@ -108,15 +107,6 @@ def test_numbers_of_any_other_message_are_columns(tmp_path: Path) -> None:
     np.testing.assert_array_equal(seen["v"], Q)
     assert set(seen["extra[1]"]) == {2.0}
     assert set(seen["ticks"]) == {7.0}
-
-
-def test_joint_states_are_read_before_other_topics(tmp_path: Path) -> None:
-    known = [
-        connection(0, "/joint_states", "sensor_msgs/JointState", JOINT_STATE),
-        connection(1, "/text", "std_msgs/String", "string data"),
-    ]
-    path = bag(tmp_path / "run.bag", known, [*joints(), message(1, 9.0, text("hello"))])
-    assert preview(path).recording.notes[0] == "run: of its topics /joint_states was read; left out: /text."
 
 
 def test_a_bag_whose_recorder_was_killed_is_read_with_a_note(tmp_path: Path) -> None:

@@ -107,43 +107,10 @@ def test_a_time_that_counts_is_asked_for_in_a_table_that_is_no_axis_too(
     assert seen.options["units"] == {"t": "ms"}
 
 
-def test_a_counter_is_asked_for_in_the_unit_in_which_a_servo_counts(tmp_path: Path) -> None:
-    """A tick of 5005 is 200 Hz in us; in ms, which was the example before, it is 0.2 Hz."""
-    seen = preview(written(tmp_path / "run.csv", "#a,b,c", 5005 * np.arange(400), TAU, Q), {"columns": {"t": "#1"}})
-    assert any("for example --units t=us" in text for text in seen.undecided)
-    assert seen.options["units"]["t"] == "us"
-
-
 def test_a_frequency_is_no_unit_of_a_time(tmp_path: Path) -> None:
     path = written(tmp_path / "run.csv", "timestep (8Hz),torque (Nm),position (rad)", 10 * np.arange(400), TAU, Q)
     with pytest.raises(UndecidedError, match='"8 Hz" of column "timestep" is no unit of time; say which'):
         Recording.read(path, {"t": "timestep"})
-
-
-def test_a_unit_that_stands_for_the_name_of_the_time_has_its_name_above(tmp_path: Path) -> None:
-    path = written(
-        tmp_path / "run.csv", "Axis1\nTime,Analog 1,Analog 2\nms,Torque (Nm),Angle (rad)", 5 * np.arange(400), TAU, Q
-    )
-    seen = Recording.read(path)
-    assert seen.sample_time == pytest.approx(5e-3)
-    assert 't = "Time" in ms' in " ".join(seen.notes)
-
-
-def test_cells_that_stand_beside_the_samples_leave_the_columns_that_are_asked_for(tmp_path: Path) -> None:
-    beside = ["Record Length", "Sample Interval", "Vertical Units", *[""] * 397]
-    values = ["2500", "4e-05", "V", *[""] * 397]
-    path = written(tmp_path / "run.csv", "", beside, values, [""] * 400, T, Q)
-    seen = preview(path, {"columns": {"t": "#4"}})
-    assert len(seen.recording) == 400
-    assert all("for example ." not in text for text in seen.undecided)
-
-
-def test_names_are_found_where_the_columns_behind_them_are_empty(tmp_path: Path) -> None:
-    header = "Id,1\nTime[ms],Realtime Tick,Present Position,Goal Position,,,,,"
-    columns = (5.0 * np.arange(400), 3.0 * np.arange(400), Q, Q, *[[""] * 400] * 5)
-    seen = preview(written(tmp_path / "run.csv", header, *columns), {"columns": {"q": "Present Position"}})
-    assert seen.recording.sample_time == pytest.approx(5e-3)
-    assert {*seen.found.values} == {"Time", "Realtime Tick", "Present Position", "Goal Position"}
 
 
 @pytest.mark.parametrize(("held", "names"), [("", ["t", "tau", "q"]), ("1.5", ["t", "tau", "q", ""])])
@@ -151,12 +118,6 @@ def test_a_column_without_a_name_is_one_if_it_holds_anything(tmp_path: Path, hel
     """A separator at the end of each row makes one that does not."""
     path = written(tmp_path / "run.csv", "t,tau,q,", T, TAU, Q, [held if k == 7 else "" for k in range(400)])
     assert [*preview(path).found.values] == names
-
-
-def test_fewer_names_than_columns_are_asked_for_where_numbers_have_points(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "t,tau", T, TAU, Q)
-    with pytest.raises(UndecidedError, match='has names that do not fit its 3 columns, "t,tau"; say which is which'):
-        Recording.read(path)
 
 
 def test_a_question_without_an_example_is_none(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
-from cosim.support.errors import RecordingError
 
 T = np.arange(1200) / 1000
 
@@ -71,9 +70,3 @@ def test_a_table_of_one_kind_of_values_in_memory_is_joined_too() -> None:
     q = np.where(np.arange(len(t)) % 2 == 1, np.sin(9 * t), np.nan)
     one = Recording.of({"t": t, "tau": tau, "q": q})
     np.testing.assert_allclose(one["q"], np.sin(9 * one.t), atol=1e-12)
-
-
-def test_a_few_readings_that_are_none_are_still_refused(tmp_path: Path) -> None:
-    q = np.where(T * 1000 % 90 < 5, np.nan, np.sin(9 * T))
-    with pytest.raises(RecordingError, match='column "q" holds nan at row 1'):
-        Recording.of({"t": T, "tau": np.cos(9 * T), "q": q})
