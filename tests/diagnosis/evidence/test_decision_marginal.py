@@ -149,14 +149,6 @@ def made(*recordings: Recording) -> tuple[Prepared, Discrepancy]:
     return prepared, discrepancy(AXIS, prepared, POLICY)
 
 
-@pytest.mark.parametrize("holes", [(), (20.0,), (11.0, 23.0, 37.0, 51.0)])
-def test_a_level_wanders_over_a_recording_whatever_holes_it_has(holes: tuple[float, ...]) -> None:
-    prepared, found = made(recorded("a", holes), recorded("b"))
-    assert len(prepared.pieces) == len(holes) + 2
-    groups = {one.name: len(one.columns) for one in found.groups}
-    assert groups["wander"] == 2 * WAVES
-
-
 def test_a_level_is_one_before_a_hole_and_after_it() -> None:
     whole, cut = (made(recorded("a", holes)) for holes in ((), (20.0, 40.0)))
     rows = [

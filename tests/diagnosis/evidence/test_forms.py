@@ -9,13 +9,11 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.adequacy import share_beside
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.evidence.forms import forms
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.stages import weighed
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
-from cosim.estimation.residuals import kept
-from pyfmi_models.effects import Effect, FrictionAsymmetry, GravityUnbalance
+from pyfmi_models.effects import Effect, FrictionAsymmetry
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -51,18 +49,6 @@ def test_a_drag_that_is_stronger_one_way_is_no_friction_asymmetry() -> None:
 
 def test_a_friction_asymmetry_beside_a_drag_is_found() -> None:
     assert asymmetry_beside(DRAG, problem_of(level_one_way=0.1)) > POLICY.strong
-
-
-@pytest.mark.parametrize(("effect", "resists"), [(DRAG, True), (GravityUnbalance(mgl=1.0, phase=0.4), False)])
-def test_what_resists_motion_may_do_so_more_one_way(effect: Effect, resists: bool) -> None:
-    problem = problem_of()
-    mount = replace(MOUNT, effects=(effect,))
-    found = forms(problem.fit(mount, 0), 0, problem.prepared)
-    assert found is not None
-    torque = kept(problem.prepared, MOUNT) - kept(problem.prepared, mount)
-    one_way = torque * np.sign(problem.prepared.stacked("v"))
-    alike = [abs(float(np.corrcoef(column, one_way)[0, 1])) for column in found.columns.T]
-    assert (max(alike) == pytest.approx(1.0, abs=1e-6)) is resists
 
 
 @pytest.mark.parametrize(("one_way", "is_left"), [(0.15, False), (0.6, True)])

@@ -8,7 +8,6 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.measure.law_selection import FOLDS, LEAST, proposed_law
-from cosim.estimation import blocks
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
@@ -86,14 +85,3 @@ def test_where_one_fold_holds_all_rows_that_count_nothing_is_predicted_and_no_la
     only[np.concatenate(Blocks.of(this.prepared).rows[fold::FOLDS])] = 1.0
     weighed = replace(this, weight=only)
     assert proposed_law(weighed, weighed.fit(this.mount, 10)) == KEPT
-
-
-def test_a_recording_of_one_block_predicts_nothing_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocks, "FEWEST", 1)  # else even a short one has several
-    t = np.arange(3_000) / 1000
-    q = 0.1 * np.sin(9 * t) * np.exp(-t)
-    prepared = prepare([Recording("short", {"t": t, "tau": row_of_elements(q), "q": q})], 15.0)
-    assert len(Blocks.of(prepared).rows) == 1
-    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1))
-    this = Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3)
-    assert proposed_law(this, this.fit(mount, 10)) == KEPT

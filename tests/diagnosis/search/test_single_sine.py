@@ -76,11 +76,6 @@ def test_errors_of_inertia_and_weight_are_large_on_one_sine_and_small_on_two(siz
     assert errors["friction.Fc"] < 2 * fewer["friction.Fc"], "what is not collinear is told as well"
 
 
-def test_a_weight_and_an_inertia_err_together_in_the_ratio_that_the_sine_has() -> None:
-    errors = errors_of(Stroke(0.1))[1]
-    assert errors["gravity_unbalance.mgl"] == pytest.approx(SLOW**2 * errors["axis.inertia"], rel=0.02)
-
-
 def gravity(stroke: Stroke, mgl: float) -> tuple[Finding, Fit]:
     """What is said of a weight that the base could take for less inertia."""
     comparison, base = compared(stroke, mgl)
