@@ -14,6 +14,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search import admissibility
 from cosim.diagnosis.search.admissibility import _way_back, in_time, is_degenerate, name_rules, needs_turns
 from cosim.diagnosis.search.commanded import is_asked_for
@@ -23,7 +24,7 @@ from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
 from cosim.estimation.row_weights import weights
-from pyfmi_models.effects import Delay
+from pyfmi_models.effects import Delay, TorqueOffset
 from pyfmi_models.effects.compliance import LoadSideCompliance
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.effects.presliding import Presliding
@@ -290,6 +291,16 @@ def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest() -> None:
         found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
         assert (found.at_rest > POLICY.half) is bends
         assert all_pass(admission(whole, found)) is bends
+
+
+def test_held_out_too() -> None:
+    whole, base = comparison(True)
+    there = prepare([recording(3, True)], 30.0)
+    held = Predictive.of(whole, there, base, there)
+    bent = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(Presliding(sigma0=SIGMA0),))
+    pushed = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(TorqueOffset(torque=0.1),))
+    assert held.at_rest(PLAIN, bent) > 0.9
+    assert held.at_rest(PLAIN, pushed) == held.at_rest(bent, bent) == 0.0
 
 
 def test_memory_is_got_from_a_contact_and_from_nothing_else() -> None:
