@@ -26,7 +26,6 @@ from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Cogging, Effect, GravityUnbalance, LocalFriction, PeriodicFriction, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.inertia_variation import InertiaVariation
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.mount import Axis, Mount
@@ -156,16 +155,3 @@ def test_a_spot_across_which_the_contact_bends_is_a_place_where_the_axis_rested(
     spot = LocalFriction(q_center=0.3, width=width, relative_amplitude=0.4)
     bristle = replace(MOUNT, friction=LuGre(sigma0=1e4, sigma1=50.0, sigma2=0.0, Fc=1.0, Fs=1.0, Vs=0.01))
     assert hypothesis_of(spot).shows(spot, bristle, SWING) is is_one
-
-
-def test_a_tone_is_not_found_in_the_noise_of_many_short_recordings_by_a_phase_in_each() -> None:
-    noise, t = np.random.default_rng(3), np.arange(200) / 100
-    runs = [{"t": t, "q": v * t, "tau": 1 + 0.1 * noise.standard_normal(200)} for v in np.linspace(1, 4, 16)]
-    prepared = prepare([Recording(f"r{number}", one) for number, one in enumerate(runs)], 5.0)
-    weight = np.ones(len(prepared.recording_of))
-    problem = Problem(MOUNT, prepared, weight, 1e-2)
-    base = problem.fit(MOUNT, 12)
-    comparison = Comparison.of(problem, base, POLICY)
-    one = refitted(comparison, base, PeriodicDisturbance(frequency_hz=3.0, amplitude=0.02), 1)
-    assert one.plain_gain > 0.05
-    assert one.evidence < POLICY.clear / 2
