@@ -9,18 +9,30 @@ machines. The recordings stay where they are.
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from cosim.plots.style import AFTER, BEFORE, GREY, LINE, STYLE
 from cosim.support.files import replacing
 from cosim.support.version import __version__
 
 WORST_FIRST = ("false", "missed", "refused", "part", "maybe", "honest", "in set", "right")
+LINE_OF_BENCH = re.compile(rf"\S+ +(?P<said>.*\S) +(?P<outcome>({'|'.join(WORST_FIRST)})( \+ false)?) +\S+ -> .*")
+PICTURE = "machines.png"
+INKS = 16
+"""Colours of the picture."""
 
 
 def main() -> int:
@@ -38,6 +50,8 @@ def main() -> int:
         given.out.mkdir(parents=True, exist_ok=True)
         with replacing(given.out / "machines.md", force=True) as path:
             path.write_text(page(rows, sums(done.stdout)), "utf-8")
+        with replacing(given.out / PICTURE, force=True) as path:
+            draw(rows, path)
     print(sums(done.stdout))
     return 0
 
@@ -59,8 +73,15 @@ def cases(data: Path, work: Path, table: str) -> Iterator[dict[str, Any]]:
             label = f"{file.parent.name}/{case['name']}"
             stored = json.loads((work / (label.replace("/", "__") + ".json")).read_text("utf-8"))
             held = (stored["answer"] or {}).get("heldout", {})
-            said, outcome = lines[label][34:109].strip(), lines[label][110:127].strip()
+            said, outcome = marked(lines[label])
             yield {"label": label, "known": case["why"], "said": said, "outcome": outcome, "held": held}
+
+
+def marked(line: str) -> tuple[str, str]:
+    """What is said in a case and how that was marked, from its line of the bench."""
+    if not (found := LINE_OF_BENCH.fullmatch(line)):
+        raise ValueError(f"no line of a case: {line}")
+    return found["said"], found["outcome"]
 
 
 def rank(outcome: str) -> int:
@@ -91,6 +112,8 @@ def page(rows: list[dict[str, Any]], counts: str) -> str:
             "Probabilities stand behind the names; `or` stands between causes that the recordings cannot separate;",
             "what is wrong or missed stands first.",
             "",
+            f"![Held-out error of each case over that of its refitted card: as delivered, and the noise]({PICTURE})",
+            "",
             head,
             *body,
             "",
@@ -100,6 +123,30 @@ def page(rows: list[dict[str, Any]], counts: str) -> str:
             "",
         ]
     )
+
+
+def draw(rows: list[dict[str, Any]], path: Path) -> None:
+    """Held-out errors over that of the refitted card, in the order of the table: delivered, and the noise."""
+    drawn = [row for row in rows if row["held"].get("before_rms")]
+    base, delivered, noise = (
+        np.array([row["held"][name] for row in drawn]) for name in ("before_rms", "after_rms", "floor_rms")
+    )
+    places = np.arange(len(drawn))[::-1]
+    with mpl.rc_context(STYLE | {"font.size": 10, "ytick.labelsize": 10, "xtick.labelsize": 10}):
+        sheet = Figure(figsize=(8, 1 + 0.22 * len(drawn)), dpi=80, layout="constrained")
+        axes = sheet.subplots()
+        axes.hlines(places, delivered / base, 1, color=LINE)
+        axes.plot(np.ones(len(drawn)), places, "s", color=BEFORE, label="refitted card")
+        axes.plot(delivered / base, places, "o", color=AFTER, label="delivered")
+        axes.plot(noise / base, places, "|", color=GREY, markersize=9, label="noise")
+        axes.set_yticks(places, [f"{row['label']}: {row['outcome']}" for row in drawn])
+        axes.set(xscale="log", xlabel="held-out error over that of the refitted card")
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.legend(loc="upper left", frameon=False)
+        drawing = BytesIO()
+        sheet.savefig(drawing, format="png")
+    with Image.open(drawing) as picture:
+        picture.convert("RGB").quantize(INKS, Image.Quantize.MAXCOVERAGE).save(path, "png", optimize=True)
 
 
 def errors(held: dict[str, Any]) -> str:
