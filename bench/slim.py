@@ -3,7 +3,7 @@
     python bench/slim.py [results/FOLDER ...]
 
 `results/` is read by people and by a few tests; the rows behind a score are made again by the page's command. An SVG
-becomes a PNG of 16 colours, a link to it follows. Of a JSON file above 25 kB lists and tables above 4 kB are left out;
+becomes a PNG of 16 colours, a link to it follows. JSON has no spaces, and above 25 kB no lists and tables above 4 kB:
 "left_out" names them. A CSV above 60 kB goes, and what linked to it says so. Pictures need Chromium and playwright.
 """
 
@@ -66,13 +66,15 @@ def pictures(folder: Path) -> Iterator[str]:
 
 
 def shortened(path: Path) -> None:
-    """Leave long lists out of a large JSON file and name them; scores stay, of which SCORES.md is made."""
-    if path.stat().st_size <= JSON_FILE:
-        return
-    document: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    long = [name for name, part in document.items() if name != "scores" and len(json.dumps(part)) > JSON_PART]
-    kept = {name: part for name, part in document.items() if name not in long}
-    path.write_text(json.dumps(kept | {"left_out": long}, indent=1) + "\n", "utf-8")
+    """Write a JSON file without spaces, a large one without its long lists, which it names.
+
+    Scores stay, of which SCORES.md is made.
+    """
+    document: Any = json.loads(path.read_text("utf-8"))
+    if path.stat().st_size > JSON_FILE:
+        long = [name for name, part in document.items() if name != "scores" and len(json.dumps(part)) > JSON_PART]
+        document = {name: part for name, part in document.items() if name not in long} | {"left_out": long}
+    path.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")) + "\n", "utf-8")
 
 
 def mended(page: Path, gone: list[str]) -> None:
