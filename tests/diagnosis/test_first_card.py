@@ -19,7 +19,7 @@ from cosim.support.errors import InputError
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import TorqueOffset
 
-SECONDS, RATE = 30.0, 500.0
+SECONDS, RATE = 30.0, 250.0
 TRUE = {"axis.inertia": 2.0, "friction.Fc": 1.5, "friction.sigma2": 3.0}
 NOISE, READING = 0.02, 1e-6
 """Of the torque [N m] and of the position [rad], RMS."""

@@ -14,7 +14,7 @@ CARD = '[mount]\nname = "axis"\ninertia = 5.0\n[friction]\nmodel = "coulomb"\nFc
 
 def recorded(name: str, phase: float, level: float, viscosity: float, seconds: float = 8.0) -> Recording:
     """40 s of motion; level and viscosity fall by these shares, with a time constant."""
-    t = np.arange(8_000) / 200
+    t = np.arange(4_000) / 100
     rng = np.random.default_rng(int(10 * phase) + 1)
     q, v, a = swing(t, [(0.6, 0.11, phase), (0.25, 0.37, 1 + phase), (0.02, 0.9, 2.0)])
     gone = 1 - np.exp(-t / seconds)

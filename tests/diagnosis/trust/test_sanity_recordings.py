@@ -67,7 +67,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
 
 @cache
 def generated(seed: int = 950, effect: str = "") -> tuple[Card, tuple[Recording, ...]]:
-    case = make_case(seed, [effect] if effect else [], duration=30.0)
+    case = make_case(seed, [effect] if effect else [], duration=30.0, rate_hz=500)
     frames = zip(("train_1", "train_2", "heldout"), (*case.train, case.heldout), strict=True)
     recordings = tuple(Recording(name, {n: f[n].to_numpy(float) for n in ("t", "tau", "q")}) for name, f in frames)
     return parse_card(to_toml(case.card), "card.toml"), recordings
