@@ -29,7 +29,7 @@ from pyfmi_models.effects import CATALOGUE, Effect
 
 Array = npt.NDArray[np.float64]
 Answer = Literal["found", "ambiguous", "not_proven", "not_decided", "not_seen", "not_testable"]
-POLICY_VERSION = "8"
+POLICY_VERSION = "9"
 """Of the constants by which is decided; it is raised when one of them changes."""
 POLICY = f"evidence {POLICY_VERSION}"
 """Name and version of the constants by which is decided."""

@@ -19,6 +19,9 @@ ANY = Recorded(inf, inf)
 """Where no recording limits what a fit may find."""
 DEAD = 0.1
 """Share of the card's number below which a friction parameter is tried at the card's number again."""
+AT_END = 1e-6
+"""Share of a number by which it may be away from an end of its range and is at that end: a thousand times what a fit
+keeps from there (`estimation/fit.py`), a millionth of any number that was found."""
 
 
 def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
@@ -43,11 +46,11 @@ def ended_sizes(effect: Effect, sizes: Sequence[str], recorded: Recorded = ANY) 
 
 
 def _ends(effect: Effect, variable: Variable, recorded: Recorded) -> bool:
-    """Whether a number is at an end of its range, up to rounding: -0.9499999999999998 is at -0.95."""
+    """Whether a number is at an end of its range: 0.94999999905 is at 0.95, as a fit goes on from 1e-9 inside."""
     low, high = effect.fit_bounds(variable, recorded)
     value = variable.start
-    is_low = value <= low or isclose(value, low)
-    return value >= high or isclose(value, high) or (low != 0 and is_low)
+    is_low = value <= low or isclose(value, low, rel_tol=AT_END)
+    return value >= high or isclose(value, high, rel_tol=AT_END) or (low != 0 and is_low)
 
 
 def refound(

@@ -6,15 +6,19 @@ with every term that may be learned, in its place and in the same nats,
 
     lead = worth(others + term) - ln(terms tried) - max(worth(others + effect), worth(others + its own table))
 
-beside what a law of friction over speed may lack, and leaves where the lead is one by which a rival is excluded where
-something has no name, and the held-out recordings do not contradict it. The machine may be off the effect's equation
-by some per cent (`evidence/forms.py`): what that explains is no lead of a term. A term that is the effect in another
-form (`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong,
-not its name. What then remains is asked again beside that term: names come in twos and threes where each imitates
-a part.
+beside what a law of friction over speed may lack. What held-out recordings prefer the term by is added, as that is
+evidence too. The effect leaves where the sum is one by which a rival is excluded where something has no name, and the
+held-out recordings do not contradict it. The machine may be off the effect's equation by some per cent
+(`evidence/forms.py`): what that explains is no lead of a term. A term that is the effect in another form
+(`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not
+its name.
+
+Names come in twos where each imitates a part: grease whose viscosity changes over a turn is friction that does, beside
+a law that falls over speed. So a term that nearly leads one name is asked in the place of two as well. What then
+remains is asked again beside that term.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, log
 
@@ -54,9 +58,9 @@ class Nameless:
 
 @dataclass(frozen=True)
 class _Challenge:
-    """An effect, the term that leads it by most, the lead [nats], and the structure without the effect."""
+    """One effect or two, the term that leads them by most, the lead in training [nats], the structure without them."""
 
-    effect: AcceptedEffect
+    effects: tuple[AcceptedEffect, ...]
     term: CandidateTerm
     lead: float
     beside: Fit
@@ -84,17 +88,22 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
     while found.proof.standing:
         known = [*offered.law, *found.terms]
         own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
-        challenges = [_challenge(comparison, found, one, own, offered) for one in found.proof.standing]
-        worst = max(challenges, key=lambda one: one.lead)
-        leads = worst.lead >= least and _holds(comparison, found, worst, held)
-        name, chosen = worst.effect.effect.name, found.proof.chosen
-        rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
-        comparison.judge(name, chosen, [rule])
+        alone = [_challenge(comparison, found, (one,), own, offered) for one in found.proof.standing]
+        asked = [*alone, *_of_two(comparison, found, alone, own, offered)]
+        tried = [(*_held(comparison, found, one, held), one) for one in asked]
+        holds, lead, worst = max(tried, key=lambda one: one[:2])
+        leads = holds and lead >= least
+        for one in worst.effects:
+            others = "".join(f" with {other.effect.name}" for other in worst.effects if other is not one)
+            rule = Rule(f"not explained better{others} by {worst.term.name}", not leads, lead, least, "nats")
+            comparison.judge(one.effect.name, found.proof.chosen, [rule])
         if not leads:
-            met = [one for one in challenges if one.lead > -inf and not hypothesis_of(one.effect.effect).is_fine]
-            return replace(found, ahead={one.effect.effect.name: -one.lead for one in met})
-        left = without(comparison, examined, found.proof, worst.effect, held)
-        found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
+            met = [(one.effects[0].effect, one.lead) for one in alone if one.lead > -inf]
+            return replace(found, ahead={one.name: -lead for one, lead in met if not hypothesis_of(one).is_fine})
+        left, gone = found.proof, {one.effect.name for one in worst.effects}
+        while out := [one for one in left.standing if one.effect.name in gone]:
+            left = without(comparison, examined, left, out[0], held)
+        found = Nameless(left, (*found.taken, *((one, worst.term) for one in worst.effects)))
     return found
 
 
@@ -115,22 +124,44 @@ def _without_misnamed(
 
 
 def _challenge(
-    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, offered: _Offered
+    comparison: Comparison,
+    found: Nameless,
+    some: tuple[AcceptedEffect, ...],
+    own: float,
+    offered: _Offered,
+    only: CandidateTerm | None = None,
 ) -> _Challenge:
-    """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
-    beside = comparison.problem.without(found.proof.chosen, one.effect.name)
-    tables = hypothesis_of(one.effect).tables
+    """What leads some effects by most, beside the terms that took a name already; `own`: the worth of all that stands.
+
+    `only`: the one term that is asked, of all that were.
+    """
+    beside, chosen = found.proof.chosen, found.proof.chosen
+    for one in some:
+        beside = comparison.problem.without(beside, one.effect.name)
+    tables = {table for one in some for table in hypothesis_of(one.effect).tables}
     law, free = offered.law, [term for term in offered.free if term.name not in found.quantities]
     alike = [term for term in free if term.name in tables]
-    terms = [*found.terms, *(term for term in free if term.name not in tables)]
+    further = [term for term in free if term.name not in tables]
+    terms = [*found.terms, *(term for term in further if only in (None, term))]
     if not terms:
-        return _Challenge(one, offered.free[0], -inf, beside)
+        return _Challenge(some, offered.free[0], -inf, beside)
     grams, known = _grams(comparison, beside, [*law, *terms, *alike]), range(len(law) + len(found.terms))
     worth = [_worth(grams, {*known, k + len(law)}) for k in range(len(terms) + len(alike))]
-    own += comparison.form_gain(found.proof.chosen, one.effect.name)
+    own += max(comparison.form_gain(chosen, one.effect.name) for one in some)
     kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
     best = max(range(len(terms)), key=lambda k: worth[k])
-    return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)
+    return _Challenge(some, terms[best], worth[best] - log(len(found.terms) + len(further)) - kind, beside)
+
+
+def _of_two(
+    comparison: Comparison, found: Nameless, alone: Sequence[_Challenge], own: float, offered: _Offered
+) -> Iterator[_Challenge]:
+    """Terms that nearly lead one name, in the place of that and another."""
+    for one in alone:
+        others = [other for other in found.proof.standing if other is not one.effects[0]]
+        if one.lead >= -comparison.policy.strong:
+            for other in others:
+                yield _challenge(comparison, found, (*one.effects, other), own, offered, one.term)
 
 
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:
@@ -143,19 +174,23 @@ def _worth(grams: Grams, chosen: Iterable[int]) -> float:
     return grams.marginal(sorted(chosen), list(range(grams.recordings))).log_likelihood
 
 
-def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predictive) -> bool:
-    """Whether the held-out recordings gain by the term, and do not prefer the name.
+def _held(comparison: Comparison, found: Nameless, one: _Challenge, held: Predictive) -> tuple[bool, float]:
+    """Whether held-out recordings gain by the term and do not prefer the names, and its lead there and in training.
 
-    They prefer it by as many nats as exclude a rival, or where the term in its place raises the plain error: what is
-    slow has few independent rows, so that a ripple of the friction may lead in nats what leaves a fifth of the error.
+    They prefer them by as many nats as exclude a rival, or where the term in their place raises the plain error: what
+    is slow has few independent rows, so that a ripple of the friction may lead in nats what leaves a fifth of the
+    error. Training may prefer each of the names by as much.
     """
     policy, named = comparison.policy, found.proof.chosen
+    if one.lead < -policy.clear * len(one.effects):
+        return False, one.lead
     with_name = allowed(comparison, named, found.terms)[0] if found.terms else named.mount
     terms = {term.name: term for term in (*found.terms, one.term)}
     whole, effects = allowed(comparison, one.beside, tuple(terms.values()))
     if not effects:
-        return False
-    gain = held.likelihood_of(whole) - held.likelihood_of(one.beside.mount)
-    lead = gain - found.proof.predicted[one.effect.effect.name]
-    raises = gained(lead, with_name, whole, held).raises(policy)
-    return gain >= policy.fair and lead >= -policy.clear and not raises
+        return False, one.lead
+    likelihood = held.likelihood_of(whole)
+    lead = likelihood - held.likelihood_of(with_name)
+    gains = likelihood - held.likelihood_of(one.beside.mount) >= policy.fair
+    holds = gains and lead >= -policy.clear and not gained(lead, with_name, whole, held).raises(policy)
+    return holds, one.lead + (max(lead, 0.0) if holds else min(lead, 0.0))

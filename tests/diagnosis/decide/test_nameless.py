@@ -16,7 +16,7 @@ from cosim.diagnosis.decide.decision import decide, followed
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.evidence.bursts import ABOVE, burst_share
-from cosim.diagnosis.search.nameless import Nameless, _Challenge, _challenge, _holds, _Offered, nameless
+from cosim.diagnosis.search.nameless import Nameless, _Challenge, _challenge, _held, _Offered, nameless
 from cosim.diagnosis.terms.candidate_terms import candidate_terms
 from cosim.diagnosis.terms.learn import allowed
 from cosim.estimation.prepare import prepare
@@ -28,6 +28,19 @@ from pyfmi_models.mount import Axis, Mount
 RIPPLING_MOTOR = (594088557, "motor_ripple", 0.39)
 """A machine of the own generator, of a deck that is development data: seed, what is concealed, size."""
 TIME, AXIS = np.arange(2000) / 100, Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0))
+
+
+class Preferring:
+    """Held-out recordings that prefer one model by so many nats more than they do."""
+
+    def __init__(self, held: Any, mount: Mount, nats: float) -> None:
+        self._held, self._mount, self._nats = held, mount, nats
+
+    def likelihood_of(self, mount: Mount) -> float:
+        return float(self._held.likelihood_of(mount) + self._nats * (mount is self._mount))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._held, name)
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +81,28 @@ def test_a_name_is_not_taken_where_held_out_recordings_contradict(
     rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
 ) -> None:
     _, (comparison, examined, proof, held) = rippling_motor
-    sure = replace(proof, predicted={name: 1e6 for name in proof.predicted})
-    assert nameless(comparison, examined, sure, held).taken == ()
+    assert nameless(comparison, examined, proof, Preferring(held, proof.chosen.mount, 1e6)).taken == ()
+
+
+def test_what_held_out_recordings_prefer_a_term_by_is_evidence_too(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    comparison, _, proof, held = rippling_motor[1]
+    (effect,) = proof.standing
+    beside = comparison.problem.without(proof.chosen, effect.effect.id)
+    tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
+    least = comparison.policy.clear
+
+    def lead(train: float, nats: float, effects: tuple[Any, ...] = (effect,)) -> tuple[bool, float]:
+        one = _Challenge(effects, tried["torque and position"], 0.0, beside)
+        prefers = Preferring(held, proof.chosen.mount, _held(comparison, Nameless(proof), one, held)[1] - nats)
+        return _held(comparison, Nameless(proof), replace(one, lead=train), prefers)
+
+    assert lead(0.0, 12.0) == (True, pytest.approx(12.0))
+    assert lead(12.0, -5.0) == (True, pytest.approx(12.0)), "what is not contradicted stays"
+    assert not lead(12.0, -least - 1)[0]
+    assert not lead(-least - 1, 50.0)[0]
+    assert lead(-least - 1, 50.0, (effect, effect)) == (True, pytest.approx(49.0 - least)), "each of two by as much"
 
 
 def test_a_term_that_raises_the_held_out_error_takes_no_name_however_many_nats_it_leads_by(
@@ -78,14 +111,14 @@ def test_a_term_that_raises_the_held_out_error_takes_no_name_however_many_nats_i
     comparison, _, proof, held = rippling_motor[1]
     (effect,) = proof.standing
     beside = comparison.problem.without(proof.chosen, effect.effect.id)
-    silent = Nameless(replace(proof, predicted={effect.effect.id: -1e6}))  # nats say nothing for the name
+    silent = Preferring(held, proof.chosen.mount, -1e6)  # nats say nothing for the name
     tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
 
     def takes(name: str) -> tuple[bool, float]:
         term = tried[name]
         whole, _ = allowed(comparison, beside, (term,))
         removed = held.plain_gains(proof.chosen.mount, whole)
-        return _holds(comparison, silent, _Challenge(effect, term, 1e3, beside), held), min(removed)
+        return _held(comparison, Nameless(proof), _Challenge((effect,), term, 1e3, beside), silent)[0], min(removed)
 
     able, removed = takes("torque and position")
     assert able
@@ -106,7 +139,7 @@ def test_what_took_a_name_stands_beside_every_rival_of_the_next(
     own = next(one for one in tried if one.name in barred)
     beside = Nameless(proof, ((effect, own),))
     alone, both = (
-        _challenge(comparison, found, effect, 0.0, _Offered(tried, [])) for found in (Nameless(proof), beside)
+        _challenge(comparison, found, (effect,), 0.0, _Offered(tried, [])) for found in (Nameless(proof), beside)
     )
     assert both.lead > alone.lead
     assert both.term.name not in (own.name, *barred)
@@ -118,12 +151,12 @@ def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(
     comparison, _, proof, _ = rippling_motor[1]
     (effect,) = proof.standing
     tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
-    leads = [_challenge(comparison, Nameless(proof), effect, own, _Offered(tried, [])).lead for own in (-1e9, -2e9)]
+    leads = [_challenge(comparison, Nameless(proof), (effect,), own, _Offered(tried, [])).lead for own in (-1e9, -2e9)]
     assert leads[0] == leads[1] < 1e6
     others = [one for one in tried if one.name not in hypothesis_of(effect.effect).tables]
-    assert _challenge(comparison, Nameless(proof), effect, -1e9, _Offered(others, [])).lead > 0.9e9
+    assert _challenge(comparison, Nameless(proof), (effect,), -1e9, _Offered(others, [])).lead > 0.9e9
     (own_alone,) = [one for one in tried if one.name in hypothesis_of(effect.effect).tables][:1]
-    none = _challenge(comparison, Nameless(proof), effect, -1e9, _Offered([own_alone], []))
+    none = _challenge(comparison, Nameless(proof), (effect,), -1e9, _Offered([own_alone], []))
     assert (none.lead, none.term) == (-np.inf, own_alone), "nothing else is there to take the name"
 
 

@@ -60,7 +60,7 @@ def test_a_range_that_holds_nothing_at_all_tells_no_size() -> None:
 def test_at_a_bound_no_size_is_told() -> None:
     known = {variable.name: variable for variable in parameters_of(Delay(delay_ms=1.0))}["delay_ms"]
     assert at_bound(Delay(delay_ms=known.high))
-    assert at_bound(Delay(delay_ms=known.high * (1 - 1e-12))), "a fit ends there up to rounding"
+    assert at_bound(Delay(delay_ms=known.high * (1 - 2e-9))), "a fit goes on from 1e-9 of its scale inside"
     assert not at_bound(Delay(delay_ms=0.999 * known.high))
     assert not told(Delay(delay_ms=known.high), delay_ms=0.01 * known.high)
     assert told(Delay(delay_ms=0.999 * known.high), delay_ms=0.01 * known.high)
