@@ -3,10 +3,10 @@
 from math import log
 
 import pytest
-from effect_examples import EXAMPLES
+from effect_examples import EXAMPLES, example
 
 from cosim.diagnosis.measure.findings import between
-from pyfmi_models.effects import FORMS, Effect
+from pyfmi_models.effects import FORMS
 from pyfmi_models.effects.shares import higher, percent
 
 BY_NAME = {form.__name__: form for form in FORMS}
@@ -58,39 +58,28 @@ TURNING = {
     "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
 }
 """By the examples of tests/tools/effect_examples.py; 36 % is 1 - (20 / 25)^2, the share that rings."""
-SLIDING = (
-    ("N·m", "N"),
-    ("per rad", "per m"),
-    (" rad ", " m "),
-    ("rad.", "m."),
-    ("rad/s", "m/s"),
-    ("per turn", "per metre"),
-)
-WEIGHT = (
-    ("constant load of 0.7", "constant force of 0.7"),
-    ("0.7 N pushes the axis backward:", "0.7 N pushes the carriage backward:"),
-)
+SLIDING = {
+    "N·m": "N",
+    "per rad": "per m",
+    " rad ": " m ",
+    "rad.": "m.",
+    "rad/s": "m/s",
+    "per turn": "per metre",
+    "of the inertia": "of the moving mass",
+    "The inertia rises": "The moving mass rises",
+    "constant load of 0.7": "constant force of 0.7",
+    "0.7 N pushes the axis backward:": "0.7 N pushes the carriage backward:",
+}
+"""What the sentence of an axis that slides says in the place of these words, and in nothing else."""
 
 
-@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
-def test_a_sentence_says_the_numbers_of_an_axis_that_turns(effect: Effect) -> None:
-    if type(effect).__name__ in TURNING:
-        assert effect.statement() == TURNING[type(effect).__name__]
-
-
-@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
-def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: Effect) -> None:
-    if type(effect).__name__ in TURNING:
-        expected = TURNING[type(effect).__name__]
-        for one, other in SLIDING:
-            expected = expected.replace(one, other)
-        for one, other in (
-            ("of the inertia", "of the moving mass"),
-            ("The inertia rises", "The moving mass rises"),
-            *WEIGHT,
-        ):
-            expected = expected.replace(one, other)
-        assert effect.statement("N") == expected
+@pytest.mark.parametrize("name", TURNING)
+def test_a_sentence_says_the_numbers_of_an_axis_that_turns_and_of_one_that_slides(name: str) -> None:
+    effect, sliding = example(BY_NAME[name]), TURNING[name]
+    assert effect.statement() == TURNING[name]
+    for one, other in SLIDING.items():
+        sliding = sliding.replace(one, other)
+    assert effect.statement("N") == sliding
 
 
 @pytest.mark.parametrize(

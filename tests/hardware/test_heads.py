@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, SIMULATED, recorded, scenario, session
+from on_hardware import SIMULATED, recorded, scenario, session
 
 from cosim.data.recording import Recording
 from cosim.hardware.blackbox import unwrapped
@@ -17,9 +17,8 @@ from cosim.hardware.replay import replay
 from cosim.hardware.session import run_session
 from cosim.hardware.structures import CFeedback, CHeads
 from cosim.hardware.words import heads_of
-from cosim.models.cache import with_fmus
 from cosim.support.errors import HardwareError
-from cosim.system.scenario import Scenario, parse_scenario
+from cosim.system.scenario import Scenario
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 QUANTUM, ECCENTRIC, APART = 1.4629180792671596e-9, 2e-5, 1e-4
@@ -124,23 +123,6 @@ def test_a_second_head_that_fails_is_a_fault_that_a_reset_does_not_take_away(tmp
     assert found["machine.tick"][first] == round((AT + 0.1) / 1e-4)
     assert not found["machine.order"][first:].any()
     assert replay(found).identical
-
-
-@pytest.mark.parametrize("velocity", ["observer", "difference"])
-@pytest.mark.parametrize("heads", [0, 4])
-def test_the_position_goes_on_where_32_bits_wrap_by_both_velocities(tmp_path: Path, velocity: str, heads: int) -> None:
-    card = tmp_path / "axis.toml"
-    text = (Path(sys.modules["pyfmi_models"].__path__[0]) / "cards" / "paper_mount.toml").read_text("utf-8")
-    card.write_text(text.replace("[controller]", f'[controller]\nvelocity = "{velocity}"'), "utf-8")
-    what = SCENARIO.replace('card = "paper_mount"\npart = "controller"', f'card = "{card}"\npart = "controller"')
-    given = with_fmus(parse_scenario(what.replace("1.4629180792671596e-9", "5e-14"), "wrap.toml", Path()))
-    done, found = followed(tmp_path / "box", encoder(heads, eccentricity=1e-6, apart=1e-5), given)
-    assert done["completed"]
-    assert np.abs(np.diff(found["machine.counts"])).max() > 2**31
-    running = found["machine.notes"].astype(int) & 2 > 0
-    error = (found["q"] - found["q_d"])[running]
-    assert np.abs(error[3000:]).max() < 1e-6
-    assert np.abs(np.diff(found["q"])).max() < 1e-6
 
 
 def combined(readings: np.ndarray, answered: np.ndarray | None = None, apart: int = 1000) -> tuple[np.ndarray, CHeads]:

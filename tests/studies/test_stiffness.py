@@ -104,15 +104,13 @@ def test_the_limit_of_a_one_sided_law_is_that_of_its_stiffer_side(card: Card) ->
 
 
 @pytest.mark.parametrize("regime", [REGIMES[1], REGIMES[2], REGIMES[3], FASTEST], ids=lambda one: one.name)
-@pytest.mark.parametrize("asymmetric", [False, True])
-def test_the_truth_agrees_with_scipys_radau(law: LuGre, regime: Regime, asymmetric: bool) -> None:
-    pairs = {"sigma0": Pair(9.8e4, 8.6e4), "Fc": Pair(2.2, 2.6), "Fs": Pair(3.2, 3.7)}
-    law = replace(law, **pairs) if asymmetric else law
+def test_the_truth_agrees_with_scipys_radau(law: LuGre, regime: Regime) -> None:
+    law = replace(law, sigma0=Pair(9.8e4, 8.6e4), Fc=Pair(2.2, 2.6), Fs=Pair(3.2, 3.7))
     short = 0.3 if regime.frequency == 2 else 0.02  # 0.02 s from rest, or 0.3 s with a reversal at 0.25 s
 
     def terms(t: float) -> tuple[float, float]:
         v = regime.speed(t)
-        sigma0, Fc, Fs = (x[int(v < 0)] if isinstance(x, Pair) else x for x in (law.sigma0, law.Fc, law.Fs))
+        sigma0, Fc, Fs = (x[int(v < 0)] for x in (law.sigma0, law.Fc, law.Fs))
         return sigma0 * v, sigma0 * abs(v) / (Fc + (Fs - Fc) * np.exp(-((v / law.Vs) ** 2)))
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
