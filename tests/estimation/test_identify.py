@@ -147,13 +147,6 @@ def test_the_friction_map_is_right_with_inertia_kept_and_wrong_without(quasi_sta
     assert np.abs(dropped.curve("positive", v)[0] - true).max() > 0.1
 
 
-def test_directions_are_told_apart(quasi_static: Recording) -> None:
-    q, tau = quasi_static["q"], quasi_static["tau"]
-    harder = np.where(np.gradient(q) < 0, 1.5, 1.0) * tau
-    fits = friction_map([replace(quasi_static, table={**quasi_static.table, "tau": harder})], 0.0, 4e-3).fits
-    assert fits["negative"].values[0] > 1.3 * fits["positive"].values[0]
-
-
 def test_a_step_in_the_friction_map_ends_at_the_steepest_curve_of_the_law(quasi_static: Recording) -> None:
     """No exponent is steep enough for a step; beyond the law's limit its powers overflow."""
     speed = np.gradient(quasi_static["q"], quasi_static.t)

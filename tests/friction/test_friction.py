@@ -23,7 +23,6 @@ from pyfmi_models.model import Model, Pair, parameters_of, symbols_of, with_symb
 from pyfmi_models.mount import Axis, Mount
 
 LUGRE, MAXWELL = EXAMPLES["lugre"], EXAMPLES["maxwell_slip"]
-DAHL = Dahl(sigma0=9.23e4, Fc=2.322)
 SPEEDS = np.array([1e-7, 1e-4, 3e-3, 0.04, 0.7])
 BEND = 2.322 / 9.23e4
 """Level over stiffness [rad]: the scale of presliding."""
@@ -70,14 +69,6 @@ def test_a_pair_is_two_parameters_and_the_direction_picks_one() -> None:
     for v, side in ((5.0, 0), (-5.0, 1), (1e-9, 0), (-1e-9, 1)):
         expected = law.Fc[side] if abs(v) > 1 else law.Fs[side]
         assert float(level(v, list(starts.values()))) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize("law", [LUGRE, DAHL, MAXWELL], ids=lambda law: law.key)
-def test_a_stiffness_that_depends_on_direction_leaves_the_torque_continuous_at_a_reversal(law: Any) -> None:
-    """The state is a torque, so the jump of 0.45 N m that a state in radians shows does not exist."""
-    this = numeric(replace(law, sigma0=Pair(9.85e4, 8.61e4), sigma2=0.0))
-    state = this.start(0.9)
-    assert this("torque", state, 1e-12)[0] == pytest.approx(this("torque", state, -1e-12)[0], abs=1e-8)
 
 
 def card(model: str, numbers: str) -> Any:
