@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from effect_examples import EXAMPLES, INERTIA, LAW, NUMBERS, evaluate, mount, of_kind, slopes
@@ -12,13 +13,19 @@ from hypothesis import strategies as st
 from pyfmi_models.effects import (
     CATALOGUE,
     FORMS,
+    ActuatorLag,
+    ClockEffect,
+    Cogging,
     Coupling,
+    Delay,
+    DriveEffect,
     Effect,
     FrictionEffect,
     GravityUnbalance,
     InertiaEffect,
     LoadEffect,
     SensorEffect,
+    StribeckEffect,
     Transmission,
 )
 from pyfmi_models.friction import Frictionless, LuGre
@@ -28,6 +35,7 @@ LUGRE = LuGre(sigma0=1e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.02)
 EACH = pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
 WEIGHT = GravityUnbalance(mgl=2.0)
 """On the axis everywhere, so that what depends on a load has one."""
+MULTIPLIED = ("friction_asymmetry", "stribeck", "position_friction", "thermal_viscosity")
 CONSERVATIVE = ("cogging", "gravity_unbalance", "torque_offset", "cable_wrap")
 
 
@@ -175,3 +183,53 @@ def test_at_rest_a_torque_accelerates_no_less_than_a_rigid_axis_would_be(effect:
         assert whole > 1.2 * INERTIA
     else:
         assert 0 < inertia < INERTIA
+
+
+KINDS = (DriveEffect, FrictionEffect, LoadEffect, InertiaEffect, Coupling, SensorEffect, ClockEffect)
+
+
+@EACH
+@pytest.mark.parametrize("unit", ["N·m", "N"])
+def test_an_effect_acts_in_one_place_and_says_what_it_is_and_what_tells_it_from_its_rivals(
+    effect: Effect, unit: str
+) -> None:
+    assert sum(isinstance(effect, kind) for kind in KINDS) == 1
+    statement = effect.statement(unit)
+    assert statement.endswith(".")
+    assert "\n" not in statement
+    assert "N·m" not in statement or unit == "N·m"
+    assert all((effect.title, effect.told_apart_by, effect.action))
+    assert effect.id not in effect.rivals
+    assert set(effect.rivals) <= set(CATALOGUE)
+
+
+multipliers = [one for one in of_kind(FrictionEffect) if one.id in MULTIPLIED and not one.states()]
+
+
+@pytest.mark.parametrize("effect", multipliers, ids=lambda one: type(one).__name__)
+def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect) -> None:
+    warm = mount(effect).at(0.0, 1.0, 0.1, {"temperature": 35.0})
+    assert isinstance(effect, StribeckEffect) or float(effect.level(0.0, warm)) == pytest.approx(0, abs=1e-12)
+    assert float(effect.viscous(0.0, warm)) == pytest.approx(0, abs=1e-12)
+
+
+def test_cycles_of_a_linear_axis_are_per_metre() -> None:
+    model = mount(Cogging(cycles_per_rev=4, amplitude=1.0), motion="linear").model()
+    for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
+        assert evaluate(model, position=q)["der(speed)"] == pytest.approx(-load / INERTIA, abs=1e-12)
+
+
+@pytest.mark.parametrize("omega", [1.0, 40.0])
+def test_the_plant_sends_the_command_through_its_drive_effects_in_series(omega: float) -> None:
+    """States of a dead time follow it within its band; there the response is the product of both."""
+    drives = (Delay(delay_ms=4.0), ActuatorLag(time_constant_ms=3.0))
+    model = mount(*drives, friction=Frictionless()).model()
+    values = [parameter.start for parameter in model.parameters]
+    x, u = ca.SX.sym("x", len(model.states)), ca.SX.sym("u", 2)
+    rates, outputs = model.equations(0, x, u, values)
+    applied = outputs[[one.name for one in model.outputs].index("applied")]
+    slopes = [ca.jacobian(part, of) for part in (rates[2:], applied) for of in (x[2:], u[0])]
+    A, B, C, D = (part.full() for part in ca.Function("slopes", [x, u], slopes)(0, 0))
+    found = (C @ np.linalg.solve(1j * omega * np.eye(len(A)) - A, B) + D).item()
+    expected = np.prod([one.response(np.array([omega])) for one in drives])
+    assert abs(found - expected) < 1e-5 * abs(expected)
