@@ -104,6 +104,7 @@ def test_a_live_session_is_not_stolen_by_who_has_the_key_too(lockstep: bool) -> 
     slow = changed(SIMULATED, "test", watchdog_ms=5000.0)
     with drive(slow, lockstep=lockstep) as there, talking(there) as loop:
         loop.enable()
+        assert loop.greet() == WELCOME, "its own greeting once more, as where the answer was lost"
         for other in (SESSION, SESSION + 1, 0):
             with talking(there, session=other, greeted=False) as thief:
                 assert thief.greet() == BUSY
