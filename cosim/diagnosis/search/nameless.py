@@ -6,15 +6,16 @@ with every term that may be learned, in its place and in the same nats,
 
     lead = worth(others + term) - ln(terms tried) - max(worth(others + effect), worth(others + its own table))
 
-beside what a law of friction over speed may lack. What held-out recordings prefer the term by is added, as that is
-evidence too. The effect leaves where the sum is one by which a rival is excluded where something has no name, and the
-held-out recordings do not contradict it. The machine may be off the effect's equation by some per cent
-(`evidence/forms.py`): what that explains is no lead of a term. A term that is the effect in another form
-(`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not
-its name.
+beside what a law of friction over speed may lack, and leaves where the lead is one by which a rival is excluded where
+something has no name, and the held-out recordings do not contradict it. The machine may be off the effect's equation
+by some per cent (`evidence/forms.py`): what that explains is no lead of a term. A term that is the effect in another
+form (`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong,
+not its name.
 
 Names come in twos where each imitates a part: grease whose viscosity changes over a turn is friction that does, beside
-a law that falls over speed. So a term that nearly leads one name is asked in the place of two as well. What then
+a law that falls over speed. So a term that nearly leads one name is asked in the place of two as well; there the nats
+by which held-out recordings prefer one term to two names are added. (For one name they are not: what else is missing
+goes with a term of many shapes, and took a load's friction from two measured joints that bend as well.) What then
 remains is asked again beside that term.
 """
 
@@ -175,14 +176,14 @@ def _worth(grams: Grams, chosen: Iterable[int]) -> float:
 
 
 def _held(comparison: Comparison, found: Nameless, one: _Challenge, held: Predictive) -> tuple[bool, float]:
-    """Whether held-out recordings gain by the term and do not prefer the names, and its lead there and in training.
+    """Whether held-out recordings gain by the term and do not prefer the names, and its lead, over two there as well.
 
     They prefer them by as many nats as exclude a rival, or where the term in their place raises the plain error: what
     is slow has few independent rows, so that a ripple of the friction may lead in nats what leaves a fifth of the
-    error. Training may prefer each of the names by as much.
+    error. Training may prefer each of two names by as much.
     """
-    policy, named = comparison.policy, found.proof.chosen
-    if one.lead < -policy.clear * len(one.effects):
+    policy, named, are_two = comparison.policy, found.proof.chosen, len(one.effects) > 1
+    if one.lead < (-2 * policy.clear if are_two else policy.clear):
         return False, one.lead
     with_name = allowed(comparison, named, found.terms)[0] if found.terms else named.mount
     terms = {term.name: term for term in (*found.terms, one.term)}
@@ -193,4 +194,4 @@ def _held(comparison: Comparison, found: Nameless, one: _Challenge, held: Predic
     lead = likelihood - held.likelihood_of(with_name)
     gains = likelihood - held.likelihood_of(one.beside.mount) >= policy.fair
     holds = gains and lead >= -policy.clear and not gained(lead, with_name, whole, held).raises(policy)
-    return holds, one.lead + (max(lead, 0.0) if holds else min(lead, 0.0))
+    return holds, one.lead + (max(lead, 0.0) * are_two if holds else min(lead, 0.0))

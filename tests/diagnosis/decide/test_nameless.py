@@ -84,25 +84,28 @@ def test_a_name_is_not_taken_where_held_out_recordings_contradict(
     assert nameless(comparison, examined, proof, Preferring(held, proof.chosen.mount, 1e6)).taken == ()
 
 
-def test_what_held_out_recordings_prefer_a_term_by_is_evidence_too(
+def test_what_held_out_recordings_prefer_one_term_to_two_names_by_is_evidence(
     rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
 ) -> None:
+    """To two alone; and training may prefer each of them by what excludes a rival."""
     comparison, _, proof, held = rippling_motor[1]
     (effect,) = proof.standing
     beside = comparison.problem.without(proof.chosen, effect.effect.id)
     tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
-    least = comparison.policy.clear
+    two = _Challenge((effect, effect), tried["torque and position"], 0.0, beside)
+    own, least = _held(comparison, Nameless(proof), two, held)[1], comparison.policy.clear
 
-    def lead(train: float, nats: float, effects: tuple[Any, ...] = (effect,)) -> tuple[bool, float]:
-        one = _Challenge(effects, tried["torque and position"], 0.0, beside)
-        prefers = Preferring(held, proof.chosen.mount, _held(comparison, Nameless(proof), one, held)[1] - nats)
-        return _held(comparison, Nameless(proof), replace(one, lead=train), prefers)
+    def lead(train: float, nats: float, names: int = 2) -> tuple[bool, float]:
+        prefers, asked = Preferring(held, proof.chosen.mount, own - nats), replace(two, effects=(effect,) * names)
+        return _held(comparison, Nameless(proof), replace(asked, lead=train), prefers)
 
     assert lead(0.0, 12.0) == (True, pytest.approx(12.0))
-    assert lead(12.0, -5.0) == (True, pytest.approx(12.0)), "what is not contradicted stays"
+    assert lead(-2 * least + 1, 50.0) == (True, pytest.approx(51.0 - 2 * least))
+    assert not lead(-2 * least - 1, 50.0)[0]
+    assert lead(12.0, 50.0, names=1) == lead(12.0, -5.0, names=1) == (True, 12.0)
+    assert not lead(least - 1, 50.0, names=1)[0]
     assert not lead(12.0, -least - 1)[0]
-    assert not lead(-least - 1, 50.0)[0]
-    assert lead(-least - 1, 50.0, (effect, effect)) == (True, pytest.approx(49.0 - least)), "each of two by as much"
+    assert not lead(12.0, -least - 1, names=1)[0]
 
 
 def test_a_term_that_raises_the_held_out_error_takes_no_name_however_many_nats_it_leads_by(
