@@ -132,7 +132,7 @@ def draw_noise(rng: np.random.Generator, mount: Parsed, noise: float) -> dict[st
 
 
 def drift(rng: np.random.Generator, n: int, rms: float, correlation_s: float) -> Array:
-    """Ornstein-Uhlenbeck noise at the ticks of the loop."""
+    """Ornstein-Uhlenbeck noise at the ticks of the loop: the bits of SciPy's `lfilter`, which loads in a second."""
     keep = float(np.exp(-TICK / correlation_s))
     kicks = rng.standard_normal(n) * rms * np.sqrt(1 - keep**2)
     kicks[:1] = rng.standard_normal() * rms

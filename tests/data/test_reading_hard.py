@@ -261,3 +261,10 @@ def test_a_formula_in_a_file_runs_only_if_it_is_arithmetic(tmp_path: Path, formu
     else:
         with pytest.raises(RecordingError, match="converted by a formula that is no plain arithmetic"):
             Recording.read(tmp_path / "run.mf4")
+
+
+def test_parquet_of_too_many_columns_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "COLUMNS", 50)
+    parquet.write_table(pa.table({f"c{number}": [1.0] for number in range(60)}), tmp_path / "run.parquet")
+    with pytest.raises(RecordingError, match=r"has 60 columns; a recording has at most 50\."):
+        Recording.read(tmp_path / "run.parquet")

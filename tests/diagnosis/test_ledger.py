@@ -158,3 +158,10 @@ def test_weights_of_the_ranked_structures_add_up_to_one_and_the_base_is_among_th
 
 def test_the_standard_error_of_a_sum_grows_with_the_root_of_its_blocks() -> None:
     assert error_of_sum(pd.Series([1.0, -1.0] * 50).to_numpy()) == pytest.approx(10.05, abs=0.01)
+
+
+def test_the_ledger_is_a_data_frame(diagnosed: tuple[Path, Any]) -> None:
+    table = diagnosed[1].ledger
+    assert isinstance(table, pd.DataFrame)
+    assert len(table) == len(rows(diagnosed[0]))
+    assert {"effects", "nats_train", "nats_heldout", "refused_by"} <= set(table.columns)

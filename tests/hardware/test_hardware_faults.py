@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from on_hardware import AT, INJECTED, SCENARIO, assert_safe, machine, recorded, scenario, session
+from on_hardware import AT, INJECTED, SCENARIO, SIMULATED, assert_safe, machine, recorded, scenario, session
 from tiny_fmu import described, description
 
 from cosim.hardware.replay import replay
@@ -152,3 +152,44 @@ def test_every_fault_is_provoked_and_documented() -> None:
     page = (Path(__file__).parents[2] / "docs" / "hardware.md").read_text("utf-8")
     for number, (name, meaning) in enumerate(FAULTS.items(), 1):
         assert f"| {number} | `{name}` | {meaning}" in page
+
+
+def test_the_adapter_may_say_itself_that_it_failed(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.enable()
+        one.track(2000)
+        one.transport.drive.failed = 1
+        begun = one.status.tick
+        one.advance(4)
+    assert_safe(recorded(tmp_path), "adapter_failed", begun, 1)
+
+
+def test_a_drive_that_leaves_operation_unasked_is_a_fault(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.enable()
+        one.track(2000)
+        one.transport.drive.state = 3
+        begun = one.status.tick
+        one.transport.drive.control = 0
+        one.axis.controlword = 7
+        one.advance(4)
+    assert_safe(recorded(tmp_path), "drive_state", begun, 2)
+
+
+@pytest.mark.parametrize(("edges", "state"), [(1, "operation enabled"), (3, "fault"), (64, "fault")])
+def test_one_late_cycle_is_held_more_stop_the_axis(tmp_path: Path, edges: int, state: str) -> None:
+    slow = SIMULATED.model_copy(update={"watchdog_ms": 100.0})
+    with session(tmp_path, slow if edges < 64 else SIMULATED) as one:
+        one.enable()
+        one.track(1000)
+        one.lose(edges)
+        one.advance(1 + edges)
+        if edges == 3:
+            assert one.status.state == "quick stop active"
+            one._ask(0)
+            one.advance(500)
+            assert one.status.state == "switch on disabled"
+        else:
+            one.advance(3)
+            assert one.status.state == state
+    assert replay(recorded(tmp_path)).identical

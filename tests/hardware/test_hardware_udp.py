@@ -259,3 +259,18 @@ def test_a_loop_without_a_clock_sleeps_as_it_waits_and_one_in_real_time_waits_as
         assert (one.transport.udp.patience, one.transport.udp.spin) == (300_000, 20_000)  # type: ignore[attr-defined]
         with one:
             pass
+
+
+@pytest.mark.parametrize(
+    ("options", "fast", "sentence"),
+    [
+        ({"step": 2e-4}, True, "has a cycle of 0.0002 s and the loop one of 0.0001 s"),
+        ({"lockstep": False}, True, "runs in real time and a loop without a clock"),
+        ({"lockstep": True}, False, "runs in lockstep, without a watchdog"),
+    ],
+)
+def test_a_drive_with_another_time_is_refused(
+    tmp_path: Path, options: dict[str, float], fast: bool, sentence: str
+) -> None:
+    with drive(**options) as there, pytest.raises(HardwareError, match=sentence):
+        session(tmp_path, there.url, fast=fast)

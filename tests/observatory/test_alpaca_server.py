@@ -148,3 +148,22 @@ def test_an_angle_that_rounds_to_24_hours_is_0_hours() -> None:
     assert _hours(-1e-17 % TURN) == 0.0
     assert _hours(0.0) == 0.0
     assert _hours(TURN / 2) == TURN / 2 * HOURS
+
+
+def test_whatever_bytes_come_the_server_goes_on(server: Server) -> None:
+    random = np.random.default_rng(6)
+    heads = (
+        b"GET /api/v1/telescope/0/%s HTTP/1.1\r\n\r\n",
+        b"PUT /api/v1/telescope/0/%s HTTP/1.1\r\nContent-Length: %s\r\n\r\n",
+    )
+    for trial in range(40):
+        noise = random.integers(1, 256, int(random.integers(0, 60)), dtype=np.uint8).tobytes()
+        text = (noise, heads[0] % noise, heads[1] % (b"tracking", noise), heads[1] % (b"tracking", b"9999999"))[
+            trial % 4
+        ]
+        with socket.create_connection(("127.0.0.1", server.port), timeout=5) as wire:
+            wire.sendall(text)
+            wire.shutdown(socket.SHUT_WR)
+            answer = wire.recv(1000)
+        assert b" 500 " not in answer.partition(b"\r\n")[0]
+    assert request(server, "GET", f"{BASE}name")[0] == 200

@@ -30,7 +30,7 @@ from serving import (
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.support.errors import InputError
+from cosim.support.errors import InputError, OutputError
 from cosim.support.lock import claimed
 from cosim_serve import example
 from cosim_serve.desk import Desk
@@ -242,3 +242,14 @@ def test_the_last_of_several_recordings_proves_where_none_was_chosen(client: Tes
     for name in ("a.csv", "b.csv"):
         put(client, job, name, example.recordings()[example.NAMES[0]].encode())
     assert "b.csv, the last one, is for validation" in client.get(job).text
+
+
+def test_no_room_on_the_disk_is_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    from cosim_serve import uploads
+
+    def full(*_: object) -> None:
+        raise OutputError("3 MB are needed and the disk has 1 MB: remove older diagnoses.")
+
+    monkeypatch.setattr(uploads, "check_room", full)
+    answer = put(client, new(client), "run.csv", recording())
+    assert "remove older diagnoses" in answer.json()["problem"]

@@ -21,6 +21,7 @@ remains is asked again beside that term.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from math import inf, log
 
 from cosim.diagnosis.answer.ledger import Rule
@@ -143,7 +144,7 @@ def _challenge(
     law, free = offered.law, [term for term in offered.free if term.name not in found.quantities]
     alike = [term for term in free if term.name in tables]
     further = [term for term in free if term.name not in tables]
-    terms = [*found.terms, *(term for term in further if only in (None, term))]
+    terms = [*found.terms, *(term for term in further if only is None or term is only)]
     if not terms:
         return _Challenge(some, offered.free[0], -inf, beside)
     grams, known = _grams(comparison, beside, [*law, *terms, *alike]), range(len(law) + len(found.terms))
@@ -157,12 +158,11 @@ def _challenge(
 def _of_two(
     comparison: Comparison, found: Nameless, alone: Sequence[_Challenge], own: float, offered: _Offered
 ) -> Iterator[_Challenge]:
-    """Terms that nearly lead one name, in the place of that and another."""
-    for one in alone:
-        others = [other for other in found.proof.standing if other is not one.effects[0]]
-        if one.lead >= -comparison.policy.strong:
-            for other in others:
-                yield _challenge(comparison, found, (*one.effects, other), own, offered, one.term)
+    """Terms that nearly lead one of two names, in the place of both."""
+    for one, other in combinations(alone, 2):
+        near = {each.term.name: each.term for each in (one, other) if each.lead >= -comparison.policy.strong}
+        for term in near.values():
+            yield _challenge(comparison, found, (*one.effects, *other.effects), own, offered, term)
 
 
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:

@@ -190,8 +190,11 @@ def recordings(noise: float, asked: float, spring: bool) -> list[Recording]:
     return out
 
 
-def asked_for(noise: float, asked: float, spring: bool) -> bool:
-    prepared = prepare(recordings(noise, asked, spring), 8.0)
+def asked_for(noise: float, asked: float, spring: bool, *, with_set_point: bool = True) -> bool:
+    made = recordings(noise, asked, spring)
+    if not with_set_point:
+        made = [Recording(one.name, {n: one.table[n] for n in ("t", "q", "tau")}) for one in made]
+    prepared = prepare(made, 8.0)
     problem = Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), DT)
     base = problem.fit(MOUNT, 25)
     found = problem.fit(replace(base.mount, effects=(SPRING,)), 15)
@@ -205,6 +208,7 @@ def test_a_spring_that_the_set_point_moves_is_asked_for(noise: float) -> None:
 
 def test_a_loop_that_answers_noise_is_no_spring() -> None:
     assert not asked_for(5.0, 0.0, False)
+    assert asked_for(5.0, 0.0, False, with_set_point=False), "without a set point nobody can be asked"
 
 
 def swung(left: Any) -> tuple[Problem, Any, Any]:

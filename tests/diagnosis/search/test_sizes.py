@@ -91,3 +91,10 @@ def test_errors_go_to_the_numbers_of_their_own_effect() -> None:
 def test_a_stribeck_curve_falls_from_a_break_away_above_the_level(level: float, plausible: bool) -> None:
     curve = StribeckEffect(Fs=level, Vs=0.1)
     assert hypothesis_of(curve).is_plausible(curve, BARE) is plausible
+
+
+def test_a_range_that_holds_all_that_it_may_be_tells_no_size() -> None:
+    known = {variable.name: variable for variable in parameters_of(Delay(delay_ms=1.0))}["delay_ms"]
+    middle = 0.5 * (known.low + known.high)
+    assert told(Delay(delay_ms=middle), delay_ms=0.2 * known.high)
+    assert not told(Delay(delay_ms=middle), delay_ms=0.3 * known.high)
