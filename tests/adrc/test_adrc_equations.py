@@ -1,29 +1,34 @@
-"""Parts of the controller that remember, tick by tick: their equations, written again in numpy."""
+"""The controller and its parts that remember, tick by tick: equations of their docstrings, written again in numpy."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import comb, exp
+from random import Random
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_adrc_memory import LUGRE, H
 
-from pyfmi_models.adrc import Adaptation, Estimate, Learning, Seen
+from pyfmi_models.adrc import VELOCITIES, Adaptation, Adrc, Estimate, Gains, Learning, Observer, Seen
+from pyfmi_models.friction import LuGre
+from pyfmi_models.model import Chapter
 
 Array = npt.NDArray[np.float64]
-BANDWIDTH = 220.0
+BANDWIDTH, H = 220.0, 1e-3
+LUGRE = LuGre(sigma0=9.23e4, sigma1=497.0, sigma2=32.77, Fc=2.322, Fs=3.322, Vs=0.04129)
 STEP = 1e-5
 """Relative step of a central difference: its error is of its square, 1e-10."""
 TICKS = 400
 
 
-def ticks(part: Estimate, seen: Array) -> tuple[Array, Array]:
+def ticks(part: Estimate, seen: Array, period: float = H) -> tuple[Array, Array]:
     """States after each tick and the torque expected in it; `seen` has observed speed, reference and residual."""
     states, numbers = part.states(), {one.name: ca.SX(one.start) for one in part.parameters()}
     numbers["observer_bandwidth"] = ca.SX(BANDWIDTH)
     x, u = ca.SX.sym("x", len(states)), ca.SX.sym("u", 3)
-    state, torque = part.advance(numbers, ca.vertsplit(x), Seen(*ca.vertsplit(u)), H)
+    state, torque = part.advance(numbers, ca.vertsplit(x), Seen(*ca.vertsplit(u)), period)
     step = ca.Function("step", [x, u], [ca.vertcat(*state), torque])
     found, torques = step.mapaccum(len(seen))([one.start for one in states], ca.DM(seen).T)
     return found.full().T, torques.full().ravel()
@@ -127,3 +132,86 @@ def test_a_pass_learns_its_share_of_the_residual_where_it_belongs(lead: float, l
         learned = np.clip(learned, -limit, limit)
         np.testing.assert_allclose(state, [(k + 1) % of, *learned], atol=1e-9)
     assert np.abs(learned).max() > 0.04
+
+
+# The whole controller
+
+J, B, KP, KD, LIMIT = 3.0, 120.0, 400.0, 40.0, 25.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linear(Estimate):
+    """A torque that goes with all that an estimate sees."""
+
+    def chapter(self, onto: str) -> Chapter:
+        return Chapter(prefix="linear", name="", title="", text="", onto=onto)
+
+    def advance(self, symbols: Any, state: list[Any], seen: Seen, period: float) -> Any:
+        return [], 0.7 + 3.0 * seen.observed - 0.5 * seen.reference + 0.05 * seen.residual
+
+
+class Controlled:
+    """States of the controller between ticks."""
+
+    def __init__(self, order: int, source: str) -> None:
+        self.order, self.source, self.started = order, source, False
+        self.last = self.acted = self.expected = self.q_last = 0.0
+        self.zeta = np.zeros(order)
+
+    def observe(self, q: float) -> None:
+        if not self.started:
+            self.zeta = np.array([q, *[0.0] * (self.order - 1)])
+            return
+        push = (self.acted - self.expected) / J
+        z1, z2, z3, *rest = self.zeta
+        jerk = rest[0] if rest else 0.0
+        a = z3 + push
+        predicted = [z1 + H * z2 + H**2 / 2 * a + H**3 / 6 * jerk, z2 + H * a + H**2 / 2 * jerk, z3 + H * jerk, jerk]
+        surprise = q - predicted[0]
+        gains = Observer(order=self.order).gains(exp(-B * H), H)  # type: ignore[arg-type]
+        self.zeta = np.array([p + k * surprise for p, k in zip(predicted, map(float, gains), strict=False)])
+
+    def tick(self, q: float, q_d: float, v_d: float, a_d: float) -> tuple[float, float]:
+        self.observe(q)
+        speed = (q - self.q_last) / H if self.source == "difference" and self.started else self.zeta[1]
+        friction = 0.7 + 3.0 * self.zeta[1] - 0.5 * v_d - 0.05 * J * self.zeta[2]
+        wanted = J * (a_d + KP * (q_d - q) + KD * (v_d - speed) - self.zeta[2]) + friction
+        tau = float(np.clip(wanted, -LIMIT, LIMIT))
+        self.acted, self.last = self.last, tau
+        self.expected, self.q_last, self.started = friction, q, True
+        return tau, friction
+
+
+@pytest.mark.parametrize("order", [3, 4])
+@pytest.mark.parametrize("source", ["observer", "difference"])
+def test_a_controller_ticks_as_its_equations_say(order: Any, source: str) -> None:
+    gains = Gains(inertia=J, kp=KP, kd=KD, observer_bandwidth=B, torque_limit=LIMIT)
+    observer = Observer(order=order)
+    made = Adrc(name="m", gains=gains, period=H, observer=observer, velocity=VELOCITIES[source], estimates=(Linear(),))
+    model, dice, own = made.model(), Random(order), Controlled(order, source)
+    state, numbers = [one.start for one in model.states], [one.start for one in model.parameters]
+    torques = []
+    for _ in range(60):
+        u = [dice.uniform(-5e-5, 5e-5), dice.uniform(-0.02, 0.02), dice.uniform(-0.3, 0.3), dice.uniform(-3, 3)]
+        following, outputs = model.equations(0.0, state, u, numbers)
+        state = following.full().ravel()
+        tau, friction = own.tick(*u)
+        np.testing.assert_allclose(outputs.full().ravel(), [tau, friction, *own.zeta[:3]], rtol=1e-9, atol=1e-12)
+        torques.append(tau)
+    assert 5 < len(set(torques)) - 2 < 55
+    assert {-LIMIT, LIMIT} < {*torques}, "within the limit, and at it on both sides"
+    assert model.period == H
+
+
+@pytest.mark.parametrize("order", [3, 4])
+@pytest.mark.parametrize("pole", [0.2, 0.9, 0.999])
+def test_every_pole_of_the_observer_is_at_one_place(order: Any, pole: float) -> None:
+    """(I - K C) A of the chain of integrators has the polynomial (z - pole)^n."""
+    chain = np.array(
+        [[H ** (j - i) / [1, 1, 2, 6][j - i] if j >= i else 0.0 for j in range(order)] for i in range(order)]
+    )
+    gains = np.array([float(one) for one in Observer(order=order).gains(pole, H)])
+    corrected = chain - np.outer(gains, chain[0])
+    scale = np.diag([H**k for k in range(order)])
+    found = np.poly(scale @ corrected @ np.linalg.inv(scale))
+    np.testing.assert_allclose(found, [comb(order, k) * (-pole) ** k for k in range(order + 1)], atol=1e-9)

@@ -1,5 +1,6 @@
-"""Connections that say nothing, or never end: they keep the page from nobody, and say nothing in the terminal."""
+"""Many requests at once: files whole, limits kept; connections that say nothing or never end harm nobody."""
 
+import json
 import logging
 import os
 import socket
@@ -8,15 +9,20 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serve_work
-from serving import _path, asked, client_of, desk_at, headers_to, listened, new, until
+from serving import _path, act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, until
+from serving import state as state_of
 
+from cosim.support.errors import InputError
 from cosim_serve import connection
 from cosim_serve.desk import Desk
+from cosim_serve.uploads import Limits
 
 __all__ = ["_path"]
+FEW = Limits(files=3, job=60_000, file=40_000)
 
 
 @pytest.fixture
@@ -164,3 +170,180 @@ def test_what_is_no_request_is_refused_and_says_nothing_in_the_terminal(
             assert line(port, text).recv(100).startswith(b"HTTP/1.1 4")
     assert asked(port, "GET", "/")[0] == 200
     assert capfd.readouterr() == ("", "")
+
+
+# Several at once
+
+
+class Upload:
+    """An upload that comes in pieces, when they are sent."""
+
+    def __init__(self, port: int, job: str, name: str, content: bytes, stated: bool = True) -> None:
+        self.content, self.stated = content, stated
+        size = f"Content-Length: {len(content)}" if stated else "Transfer-Encoding: chunked"
+        self.line = line(port, head_of(port, "PUT", f"{job}/files?name={name}") + f"{size}\n\n")
+        self._send(content[:1000])
+
+    def _send(self, part: bytes) -> None:
+        self.line.sendall(part if self.stated else b"%x\r\n%s\r\n" % (len(part), part))
+
+    def finish(self) -> tuple[int, str]:
+        """Send the rest; status and problem."""
+        try:
+            self._send(self.content[1000:])
+            if not self.stated:
+                self.line.sendall(b"0\r\n\r\n")
+        except OSError:  # refused before
+            pass
+        text = b""
+        while not text.rstrip().endswith(b"}"):
+            text += self.line.recv(65536)
+        self.line.close()
+        head, _, body = text.partition(b"\r\n\r\n")
+        return int(head.split()[1]), json.loads(body).get("problem", "")
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
+    with desk_at(tmp_path / "data", serve_work.for_ever, FEW) as desk, listened(desk) as port:
+        yield desk, port
+        while LINES:
+            LINES.pop().close()
+
+
+def on_their_way(desk: Desk, job: str) -> int:
+    folders = os.walk(desk.store.home / id_of(job) / "arriving")  # one may go while it is looked into
+    return sum(len(files) for _, _, files in folders)
+
+
+def whole(desk: Desk, job: str) -> dict[str, bytes]:
+    return {one.name: one.read_bytes() for one in (desk.store.home / id_of(job) / "recordings").iterdir()}
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_of_two_uploads_of_one_name_the_first_arrives_whole_and_the_second_is_refused(
+    slow: tuple[Desk, int], stated: bool
+) -> None:
+    desk, port = slow
+    job = new(client_of(desk))
+    first, second = recording(300, 1), recording(500, 2)
+    one = Upload(port, job, "a.csv", first, stated)
+    until(lambda: on_their_way(desk, job) == 1)
+    status, problem = Upload(port, job, "A.csv", second, stated).finish()
+    assert (status, "is being uploaded already" in problem) == (400, True)
+    assert one.finish() == (201, "")
+    assert whole(desk, job) == {"a.csv": first}
+    assert on_their_way(desk, job) == 0
+
+
+def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow: tuple[Desk, int]) -> None:
+    desk, port = slow
+    job = new(client_of(desk))
+    answers: list[int] = []
+
+    def put(number: int) -> None:
+        answers.append(asked(port, "PUT", f"{job}/files?name=n{number}.csv", recording(30))[0])
+
+    threads = [threading.Thread(target=put, args=(number,)) for number in range(10)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert sorted(answers) == [201] * 3 + [400] * 7
+    assert len(state_of(desk, job).uploads) == len(whole(desk, job)) == 3
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int], stated: bool) -> None:
+    desk, port = slow
+    job = new(client_of(desk))
+    content = b"t,tau,q\n" + b"1,2,3\n" * 5800
+    assert len(content) < FEW.file < FEW.job < 2 * len(content)
+    first, second = (Upload(port, job, f"{name}.csv", content, stated) for name in "ab")
+    done = sorted([first.finish(), second.finish()])
+    assert [status for status, _ in done] == [201, 400]
+    assert "too large: at most" in done[1][1]
+    assert sum(map(len, whole(desk, job).values())) <= FEW.job
+    assert Upload(port, job, "c.csv", recording(30)).finish()[0] == 201, "what was refused leaves its place"
+
+
+def test_an_upload_that_ends_after_the_start_does_not_change_the_diagnosis(slow: tuple[Desk, int]) -> None:
+    desk, port = slow
+    client = client_of(desk)
+    job = ready(client)
+    late = Upload(port, job, "late.csv", recording(900))
+    until(lambda: on_their_way(desk, job) == 1)
+    act(client, job, "start")
+    until(lambda: desk.queue.progress.answer)
+    status, problem = late.finish()
+    assert status == 400
+    assert "started before this file had come" in problem
+    assert [one.name for one in state_of(desk, job).uploads] == ["run1.csv", "heldout.csv"]
+    assert set(whole(desk, job)) == {"run1.csv", "heldout.csv"}
+    assert on_their_way(desk, job) == 0
+
+
+@pytest.mark.parametrize("work", ["look", "card"])
+def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(
+    slow: tuple[Desk, int], work: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Looking takes seconds; whoever presses the button meanwhile has started what was there."""
+    desk, _ = slow
+    client = client_of(desk)
+    job = ready(client)
+    reads = getattr(desk.reader, work)
+
+    def started_meanwhile(*given: Any) -> Any:
+        if not state_of(desk, job).live:
+            desk.start(id_of(job))
+        return reads(*given)
+
+    before = desk.views(state_of(desk, job)), desk.card_text(state_of(desk, job))
+    monkeypatch.setattr(desk.reader, work, started_meanwhile)
+    form = {"look": {"file": "run1.csv", "units.q": "deg"}, "card": {"text": "[mount]\ninertia = 2.0\n"}}[work]
+    answer = act(client, job, "correct" if work == "look" else "card", **form)
+    assert (answer.status_code, "cannot be changed now" in answer.text) == (400, True)
+    assert not any(one.options.get("units") for one in state_of(desk, job).uploads)
+    assert (desk.views(state_of(desk, job)), desk.card_text(state_of(desk, job))) == before
+
+
+def test_a_job_that_is_removed_while_a_file_comes_leaves_nothing(slow: tuple[Desk, int]) -> None:
+    desk, port = slow
+    client = client_of(desk)
+    job = new(client)
+    late = Upload(port, job, "late.csv", recording(900))
+    until(lambda: on_their_way(desk, job) == 1)
+    act(client, job, "remove")
+    assert late.finish()[0] == 400
+    assert [*desk.store.home.iterdir()] == []
+
+
+def test_a_file_of_which_the_rest_never_comes_leaves_its_place(slow: tuple[Desk, int]) -> None:
+    desk, port = slow
+    job = new(client_of(desk))
+    torn = Upload(port, job, "a.csv", recording(900))
+    until(lambda: on_their_way(desk, job) == 1)
+    torn.line.close()
+    until(lambda: on_their_way(desk, job) == 0)
+    assert Upload(port, job, "a.csv", recording()).finish() == (201, "")
+
+
+def test_of_two_starts_at_once_one_counts(slow: tuple[Desk, int]) -> None:
+    desk, _ = slow
+    job = ready(client_of(desk))
+    told: list[str] = []
+
+    def start() -> None:
+        try:
+            desk.start(id_of(job))
+        except InputError as error:
+            told.append(str(error))
+
+    threads = [threading.Thread(target=start) for _ in range(6)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert len(told) == 5
+    assert all("it cannot be changed now" in one for one in told)
+    assert desk.queue.before(id_of(job)) <= 1
