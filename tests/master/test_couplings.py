@@ -20,8 +20,6 @@ def test_a_piece_grows_by_the_error_and_by_how_it_changed_within_bounds(before: 
 def test_a_piece_without_an_error_grows_most_and_the_first_has_none_before_it() -> None:
     assert _growth(0.5, 0.0) == 1.5
     assert _growth(0.0, 2.0) == pytest.approx(0.9 * 2**-0.125, rel=1e-14)
-    assert _growth(1e9, 1.0) == 1.5
-    assert _growth(1e-9, 1e9) == 0.2
 
 
 @pytest.mark.parametrize("most", [1, 2, 8, 16])

@@ -42,25 +42,20 @@ def test_a_component_may_ask_to_end_the_run_and_what_was_until_then_is_whole(
 
 
 @LOOPS
-def test_a_discarded_step_that_ends_nothing_is_a_failure(tiny: dict[int, Path], compiled: bool) -> None:
-    parameters = {"one": {"status": DISCARDS, "fail_at": 1.0}}
-    with pytest.raises(StepError, match="one discarded the step at tick 10"):
-        simulate(
-            {"one": tiny[2]}, [], record={"y": "one.y"}, step=0.1, ticks=20, parameters=parameters, compiled=compiled
-        )
-
-
-@LOOPS
-def test_a_step_that_returns_early_unasked_is_a_failure_and_no_loss_of_time(
-    tiny: dict[int, Path], compiled: bool
+@pytest.mark.parametrize(
+    ("fmi", "status", "said"),
+    [
+        (2, DISCARDS, "one discarded the step at tick 10"),
+        (3, EARLY, "one returned early from its step, though early return is not allowed here, at tick 10"),
+    ],
+)
+def test_a_step_cut_short_that_ends_nothing_is_a_failure(
+    tiny: dict[int, Path], fmi: int, status: float, said: str, compiled: bool
 ) -> None:
     """Early return is never allowed here, so an FMU goes through its events itself; one that does not is named."""
-    parameters = {"one": {"status": EARLY, "fail_at": 1.0}}
-    said = "one returned early from its step, though early return is not allowed here, at tick 10"
+    given: dict = {"parameters": {"one": {"status": status, "fail_at": 1.0}}, "compiled": compiled}
     with pytest.raises(StepError, match=said):
-        simulate(
-            {"one": tiny[3]}, [], record={"y": "one.y"}, step=0.1, ticks=20, parameters=parameters, compiled=compiled
-        )
+        simulate({"one": tiny[fmi]}, [], record={"y": "one.y"}, step=0.1, ticks=20, **given)
 
 
 @LOOPS

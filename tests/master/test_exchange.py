@@ -41,11 +41,7 @@ def axis(plant: Any, controller: Any, **options: Any) -> dict[str, np.ndarray]:
     with plant, controller:
         recording = simulate(
             {"plant": plant, "controller": controller},
-            [
-                ("controller.command", "plant.drive"),
-                ("plant.reading", "controller.measured"),
-                ("r", "controller.wanted"),
-            ],
+            WIRES,
             record={"q": "plant.reading", "tau": "controller.command", "friction": "plant.torque"},
             step=2.5e-4,
             ticks=2000,
