@@ -116,14 +116,17 @@ def test_compensation_integrates_the_bristles_with_the_speed_of_the_middle() -> 
     assert np.abs(bristles(FINE) - fine).max() < 5e-5 * LUGRE.Fs
 
 
-@pytest.mark.parametrize("case", ["C3a", "C3b"])
-def test_compensation_by_the_reference_is_the_friction_of_that_motion(case: str) -> None:
-    """At constant set-point speed the estimate is steady sliding friction, whatever the axis does."""
+@pytest.mark.parametrize(("case", "settled"), [("C3a", 1e-6), ("C3b", 1e-6), ("C2a+C3a", 0.01)])
+def test_compensation_of_a_steady_motion_is_its_friction(case: str, settled: float) -> None:
+    """At constant set-point speed the estimate is steady sliding friction; two halves are a whole.
+
+    The observed speed has come within a per cent of it by then.
+    """
     t = FINE * np.arange(3000)
     reference = np.stack([0.05 * t, np.full_like(t, 0.05), 0 * t], axis=1)
     found = close(controller(*compensation_case(case, LUGRE), period=FINE), reference, 0 * t)
     expected = float(LUGRE.level(0.05)) + LUGRE.sigma2 * 0.05
-    assert found["friction_estimate"][-1] == pytest.approx(expected, rel=1e-6)
+    assert found["friction_estimate"][-1] == pytest.approx(expected, rel=settled)
 
 
 # Learning
