@@ -45,9 +45,10 @@ def test_the_axis_own_speed_serves_as_v_in_the_unit_that_makes_it_the_slope(
     assert any("is the slope of the position and serves as v" in note for note in recording.notes)
 
 
-def test_the_speed_of_a_neighbour_stays_a_column_of_its_own(tmp_path: Path) -> None:
-    recording = read(tmp_path, "t,tau,q,axis2_speed", T, TAU, Q, np.sin(5 * T))
-    assert recording.columns == ("t", "tau", "q", "axis2_speed")
+@pytest.mark.parametrize(("name", "rate"), [("axis2_speed", 5), ("fan_current", 11)])
+def test_the_speed_of_a_neighbour_and_a_current_of_its_own_stay_columns(tmp_path: Path, name: str, rate: int) -> None:
+    recording = read(tmp_path, f"t,tau,q,{name}", T, TAU, Q, np.sin(rate * T))
+    assert recording.columns == ("t", "tau", "q", name)
 
 
 def test_the_speed_before_a_gear_and_the_torque_in_other_units_are_no_causes(tmp_path: Path) -> None:
@@ -55,11 +56,6 @@ def test_the_speed_before_a_gear_and_the_torque_in_other_units_are_no_causes(tmp
     recording = read(tmp_path, "t,tau,q,velocity,motor_speed,torque_mNm,iq", *columns)
     assert recording.columns == ("t", "tau", "q", "v")
     assert any("left out: motor_speed, torque_mNm, iq." in note for note in recording.notes)
-
-
-def test_a_current_that_is_no_copy_of_the_torque_stays(tmp_path: Path) -> None:
-    recording = read(tmp_path, "t,tau,q,fan_current", T, TAU, Q, np.cos(11 * T))
-    assert "fan_current" in recording
 
 
 def test_the_speed_tells_that_time_counts_milliseconds(tmp_path: Path) -> None:

@@ -32,21 +32,18 @@ def test_a_loop_that_is_switched_on_is_left_out_and_said() -> None:
     assert np.abs(taken["tau"]).max() < 5
 
 
-def test_a_rough_start_and_one_that_moves_the_axis_stay() -> None:
-    for one in (run(1.0), run(1.0, kick=4.0), run(3.0, rise=0.05)):
-        assert len(as_analysed(one)) == len(one)
-    fast = run(3.0, rise=0.01)
-    assert np.abs(fast["tau"][:100]).max() > 3 * np.abs(fast["tau"][100:]).max(), "the torque alone would be enough"
-    assert len(as_analysed(fast)) == len(fast)
-
-
-def test_a_quick_move_there_and_back_stays() -> None:
+def there_and_back() -> Recording:
     slow = run(0.3)
-    t = slow.t
-    move = 8.0 * np.sin(2 * np.pi * t / 0.1) * (t < 0.1)
-    table = {**slow.table, "tau": slow["tau"] + move}
-    assert np.abs(table["tau"][:100]).max() > 3 * np.abs(table["tau"][100:]).max()
-    assert len(as_analysed(Recording.of(table, "move"))) == len(t)
+    move = 8.0 * np.sin(2 * np.pi * slow.t / 0.1) * (slow.t < 0.1)
+    return Recording.of({**slow.table, "tau": slow["tau"] + move}, "move")
+
+
+def test_a_rough_start_and_one_that_moves_the_axis_stay() -> None:
+    fast, quick = run(3.0, rise=0.01), there_and_back()
+    for one in (fast, quick):
+        assert np.abs(one["tau"][:100]).max() > 3 * np.abs(one["tau"][100:]).max(), "the torque alone would be enough"
+    for one in (run(1.0), run(1.0, kick=4.0), run(3.0, rise=0.05), fast, quick):
+        assert len(as_analysed(one)) == len(one)
 
 
 def filtered(one: Recording) -> tuple[np.ndarray, np.ndarray]:
