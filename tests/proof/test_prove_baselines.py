@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_prove import row
+from prove_rows import row
 
 from cosim.diagnosis.measure.protocol import heldout_rms
 from cosim.estimation.prepare import prepare
