@@ -79,3 +79,8 @@ def test_a_position_whose_slope_is_the_speed_in_another_unit_only_is_asked_for(
     with pytest.raises(UndecidedError, match=re.escape(f"only if that is in {unit}, and the file states no unit")):
         read(tmp_path, header, T, TAU, factor * Q, V)
     np.testing.assert_allclose(read(tmp_path, header, T, TAU, factor * Q, V, units={"q": unit})["q"], Q, atol=1e-6)
+
+
+def test_the_speed_of_another_shaft_alone_is_no_speed_of_the_axis(tmp_path: Path) -> None:
+    recording = read(tmp_path, "t,tau,q,motor_speed", T, TAU, Q, 81 * V)
+    assert "v" not in recording.columns
