@@ -193,7 +193,7 @@ def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(
     beside = {"b": [rival("r", 60.0)], "br": [p], "bpr": [q]}
     worth = {"x": 50.0, "r": 60.0, "p": 900.0, "q": 900.0}
     free = play("x", worth, beside)
-    assert (chosen(free), free.ended) == ("brpq", ())
+    assert (chosen(free), free.ended) == ("brpq", ()), "what has evidence beside what was swapped in is added"
     monkeypatch.setattr(Ruled, "policy", replace(RULES, most_effects=1))
     stopped = play("x", worth, beside)
     assert chosen(stopped) == "brp", "what was found by then stands, what has evidence beside it is not asked for"
@@ -229,13 +229,6 @@ def test_effects_of_one_kind_are_one_group_and_those_of_the_card_in_none() -> No
     one = Fitted(Structure((Named("b"), Named("x"), Named("y"), Named("x", 2.0))))
     groups = grouped(Ruled(), one)  # type: ignore[arg-type]
     assert [[effect.id for effect in group] for group in groups] == [["x", "x"], ["y"]]
-
-
-def test_what_has_evidence_only_beside_an_effect_that_was_swapped_in_is_added(play: Play) -> None:
-    behind = replace(rival("p", 900.0, beside="br"), adds=True)
-    beside = {"b": [rival("r", 60.0)], "br": [behind]}
-    found = play("x", {"x": 50.0, "r": 60.0, "p": 900.0}, beside)
-    assert chosen(found) == "brp"
 
 
 def test_beside_an_effect_that_explains_little_nothing_is_added(play: Play) -> None:
