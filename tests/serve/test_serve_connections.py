@@ -6,7 +6,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -211,6 +211,15 @@ def slow(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
             LINES.pop().close()
 
 
+def together(work: Callable[[int], None], count: int) -> None:
+    """Call `work` with each number below `count`, in as many threads."""
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(count)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+
+
 def on_their_way(desk: Desk, job: str) -> int:
     folders = os.walk(desk.store.home / id_of(job) / "arriving")  # one may go while it is looked into
     return sum(len(files) for _, _, files in folders)
@@ -244,11 +253,7 @@ def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow:
     def put(number: int) -> None:
         answers.append(asked(port, "PUT", f"{job}/files?name=n{number}.csv", recording(30))[0])
 
-    threads = [threading.Thread(target=put, args=(number,)) for number in range(10)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    together(put, 10)
     assert sorted(answers) == [201] * 3 + [400] * 7
     assert len(state_of(desk, job).uploads) == len(whole(desk, job)) == 3
 
@@ -333,17 +338,13 @@ def test_of_two_starts_at_once_one_counts(slow: tuple[Desk, int]) -> None:
     job = ready(client_of(desk))
     told: list[str] = []
 
-    def start() -> None:
+    def start(_: int) -> None:
         try:
             desk.start(id_of(job))
         except InputError as error:
             told.append(str(error))
 
-    threads = [threading.Thread(target=start) for _ in range(6)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    together(start, 6)
     assert len(told) == 5
     assert all("it cannot be changed now" in one for one in told)
     assert desk.queue.before(id_of(job)) <= 1
