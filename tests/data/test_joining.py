@@ -33,34 +33,20 @@ def joined(found: Columns, required: tuple[str, ...] = REQUIRED, **columns: str)
     return on_one_time(Request(PATH, columns, required=required), found)
 
 
-@pytest.mark.parametrize("part", [slice(1000, None), slice(0, 2500), slice(700, 3100)], ids=["late", "early", "both"])
+SHORT = {"late": T >= 1, "early": T < 2.5, "both": (T >= 0.7) & (T < 3.1), "gap": (T < 1) | (T > 1.5)}
+
+
+@pytest.mark.parametrize("part", SHORT)
 @pytest.mark.parametrize("short", ["Torque", "Angle"])
-def test_only_the_common_span_is_kept(part: slice, short: str) -> None:
-    spans = {name: part if name == short else slice(None) for name in ("Torque", "Angle")}
-    found = joined(
-        channels(
-            Torque=(T[spans["Torque"]], torque(T)[spans["Torque"]]),
-            Angle=(T[spans["Angle"]], position(T)[spans["Angle"]]),
-        )
-    )
-    np.testing.assert_array_equal(found.values["t"], T[part])
-    np.testing.assert_array_equal(found.values["Angle"], position(T)[part])
-    np.testing.assert_array_equal(found.values["Torque"], torque(T)[part])
+def test_only_the_common_span_is_kept_and_a_gap_of_a_channel_is_a_gap_of_the_recording(part: str, short: str) -> None:
+    there, whole = SHORT[part], {"Torque": torque(T), "Angle": position(T)}
+    found = joined(channels(**{name: (T[there], x[there]) if name == short else (T, x) for name, x in whole.items()}))
+    np.testing.assert_array_equal(found.values["t"], T[there])
+    for name, x in whole.items():
+        np.testing.assert_array_equal(found.values[name], x[there])
     assert '"Angle" (1,000 Hz, ' in found.notes[0]
     assert 'the times of "Torque" (1,000 Hz, ' in found.notes[0]
-
-
-@pytest.mark.parametrize("short", ["Torque", "Angle"])
-def test_a_gap_of_a_channel_is_a_gap_of_the_recording(short: str) -> None:
-    there = (T < 1) | (T > 1.5)
-    kept = {name: there if name == short else np.ones(len(T), bool) for name in ("Torque", "Angle")}
-    found = joined(
-        channels(
-            Torque=(T[kept["Torque"]], torque(T)[kept["Torque"]]), Angle=(T[kept["Angle"]], position(T)[kept["Angle"]])
-        )
-    )
-    np.testing.assert_array_equal(found.values["t"], T[there])
-    assert "1 gap)" in found.notes[0]
+    assert ("1 gap)" in found.notes[0]) == (part == "gap")
 
 
 def test_samples_that_are_invalid_are_a_gap_too() -> None:
@@ -125,11 +111,12 @@ def test_a_slow_temperature_is_read_on_a_line_and_holds_for_one_period_at_its_en
     assert "0.3 s apart" in found.notes[0]
 
 
-def test_a_channel_that_would_cost_too_many_rows_is_left_out_and_named() -> None:
-    found = joined(channels(tau=(T, torque(T)), q=(T, position(T)), fan=(T[:2000], T[:2000])))
+def test_a_channel_that_would_cost_too_many_rows_or_holds_a_text_is_left_out() -> None:
+    words = np.array(["bad" if k == 7 else 0.0 for k in range(len(T))], dtype=object)
+    found = joined(channels(tau=(T, torque(T)), q=(T, position(T)), fan=(T[:2000], T[:2000]), word=(T, words)))
     assert list(found.values) == ["t", "tau", "q"]
     assert len(found.values["t"]) == len(T)
-    assert found.notes == ("run: channels that do not cover these rows were left out: fan.",)
+    assert "run: channels that do not cover these rows were left out: fan." in found.notes
 
 
 def test_a_position_of_one_turn_is_not_read_between_its_end_and_its_start() -> None:
@@ -139,17 +126,13 @@ def test_a_position_of_one_turn_is_not_read_between_its_end_and_its_start() -> N
     np.testing.assert_allclose(found.values["q"], 3 * found.values["t"], atol=1e-9)
 
 
-def test_channels_without_a_common_time_are_refused() -> None:
-    with pytest.raises(
-        RecordingError, match=r'run.mf4: "Torque" \(1,000 Hz, 0 s to 3.999 s\) and "Angle" .* no times in common'
-    ):
-        joined(channels(Torque=(T, torque(T)), Angle=(T + 10, position(T))))
-
-
-def test_channels_of_one_time_are_a_table_without_a_note() -> None:
+def test_channels_of_one_time_are_a_table_and_those_without_a_common_time_are_refused() -> None:
     found = joined(channels(tau=(T, torque(T)), q=(T, position(T))))
     assert found.notes == ()
     np.testing.assert_array_equal(found.values["q"], position(T))
+    rule = r'run.mf4: "Torque" \(1,000 Hz, 0 s to 3.999 s\) and "Angle" .* no times in common'
+    with pytest.raises(RecordingError, match=rule):
+        joined(channels(Torque=(T, torque(T)), Angle=(T + 10, position(T))))
 
 
 @settings(max_examples=60, deadline=None)
@@ -190,10 +173,3 @@ def test_mdf_groups_of_two_devices_are_joined_and_bits_of_invalidity_count(tmp_p
     np.testing.assert_array_equal(recording.t, T[(T >= 1) & ~bad])
     np.testing.assert_array_equal(recording["q"], position(recording.t))
     assert any('put on the times of "Torque"' in note for note in recording.notes)
-
-
-def test_a_channel_that_holds_a_text_is_left_out_and_the_others_are_joined() -> None:
-    words = np.array(["bad" if k == 7 else 0.0 for k in range(len(T))], dtype=object)
-    found = joined(channels(tau=(T, torque(T)), q=(T, position(T)), word=(T, words)))
-    assert {"tau", "q"} <= set(found.values)
-    assert "word" not in found.values

@@ -2,7 +2,6 @@
 
 import gc
 import gzip
-import importlib.util
 import json
 import random
 import re
@@ -12,10 +11,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyarrow as pa
 import pytest
+from damages import damaged
 from pyarrow import parquet
+from scipy.io import savemat
 
 from cosim.cli import main
 from cosim.data import limits
@@ -66,52 +68,59 @@ def test_numbers_that_no_axis_has_are_refused(tmp_path: Path, what: str) -> None
         Recording.read(written(tmp_path / "run.csv", csv_text(table)))
 
 
-def test_a_million_columns_are_refused_before_they_are_parsed(tmp_path: Path) -> None:
-    names, row = ",".join(f"c{number}" for number in range(10**6)), ",".join(["1"] * 10**6)
-    path = written(tmp_path / "run.csv", f"{names}\n{row}\n{row}\n")
-    with (
-        bounded(600),
-        pytest.raises(RecordingError, match=r"has 1,000,000 columns; a recording has at most 10,000."),
-    ):
+def a_million_columns() -> bytes:
+    row = ",".join(["1"] * 10**6)
+    return f"{','.join(f'c{number}' for number in range(10**6))}\n{row}\n{row}\n".encode()
+
+
+def a_gigabyte() -> bytes:
+    return gzip.compress(b"t,tau,q\n") + 250 * gzip.compress(b"0.001,1,2\n" * 400_000)
+
+
+@pytest.mark.parametrize(
+    ("name", "made", "megabytes", "sentence"),
+    [
+        ("run.csv", a_million_columns, 600, "has 1,000,000 columns; a recording has at most 10,000."),
+        ("run.csv.gz", a_gigabyte, 500, r"to 20\d MB or more; a file .* may unpack to 200 MB: .* limit=2\."),
+    ],
+)
+def test_what_is_far_too_much_is_refused_before_it_is_parsed(
+    tmp_path: Path, name: str, made: Callable[[], bytes], megabytes: float, sentence: str
+) -> None:
+    path = written(tmp_path / name, made())
+    with bounded(megabytes), pytest.raises(RecordingError, match=sentence):
         Recording.read(path)
 
 
-def test_a_bomb_of_a_gigabyte_is_refused_early(tmp_path: Path) -> None:
-    four_megabytes = gzip.compress(b"0.001,1,2\n" * 400_000)
-    (tmp_path / "run.csv.gz").write_bytes(gzip.compress(b"t,tau,q\n") + four_megabytes * 250)
-    with (
-        bounded(500),
-        pytest.raises(
-            RecordingError, match=r"unpacks to 20\d MB or more; a file .* may unpack to 200 MB: .* limit=2\."
+@pytest.mark.parametrize(
+    ("bound", "most", "name", "sentence"),
+    [
+        (
+            "TEXT",
+            1000,
+            "run.csv",
+            r"more than 1 kB of text; write it as Parquet, cut it in pieces, or .* limit=\d+",
         ),
-    ):
-        Recording.read(tmp_path / "run.csv.gz")
+        ("COLUMNS", 2, "run.csv", r"has 3 columns; a recording has at most 2\."),
+        ("COLUMNS", 2, "run.parquet", r"has 3 columns; a recording has at most 2\."),
+    ],
+)
+def test_a_bound_holds_where_files_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bound: str, most: int, name: str, sentence: str
+) -> None:
+    path = Recording("run", TABLE).write(tmp_path / name)
+    monkeypatch.setattr(limits, bound, most)
+    with pytest.raises(RecordingError, match=sentence):
+        Recording.read(path)
 
 
-def test_text_that_is_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "TEXT", 1000)
-    with pytest.raises(
-        RecordingError,
-        match=r"holds more than 1 kB of text; write it as Parquet, cut it in pieces, or .* limit=\d+\.",
-    ):
-        Recording.read(written(tmp_path / "run.csv", csv_text(TABLE)))
-
-
-@pytest.mark.parametrize("origin", [5, "text", [1, 2], None, True, {"file": 7, "version": ["x"]}])
-def test_an_origin_may_be_anything(tmp_path: Path, origin: object) -> None:
-    Recording("run", TABLE, {"t": "s"}).write(tmp_path / "run.parquet")
-    table = parquet.read_table(tmp_path / "run.parquet")
-    metadata = {**(table.schema.metadata or {}), b"cosim.origin": json.dumps(origin).encode()}
-    parquet.write_table(table.replace_schema_metadata(metadata), tmp_path / "odd.parquet")
+@pytest.mark.parametrize("origin", ["5", '"text"', "[1]", "null", "true", '{"file": 7, "version": ["x"]}', "{" * 5000])
+def test_an_origin_may_be_anything(tmp_path: Path, origin: str) -> None:
+    table = pa.table(TABLE).replace_schema_metadata({b"cosim.origin": origin.encode()})
+    parquet.write_table(table, tmp_path / "odd.parquet")
     recording = Recording.read(tmp_path / "odd.parquet")
     assert len(recording.sha256) == 64
-    assert bool(recording.notes) == (not isinstance(origin, dict))
-
-
-def test_an_origin_that_is_no_json_is_left_out_with_a_note(tmp_path: Path) -> None:
-    table = pa.table(TABLE).replace_schema_metadata({b"cosim.origin": b"{" * 5000})
-    parquet.write_table(table, tmp_path / "run.parquet")
-    assert "its origin was left out" in Recording.read(tmp_path / "run.parquet").notes[0]
+    assert ["its origin was left out" in note for note in recording.notes] == [True] * (origin[1:6] != '"file')
 
 
 def test_messages_stay_short_however_long_names_are(tmp_path: Path) -> None:
@@ -168,60 +177,26 @@ def test_a_name_that_no_file_can_have_is_one_sentence(tmp_path: Path, name: str)
         Recording.read(tmp_path / name)
 
 
-SIGNS = (b",", b";", b"\t", b".", b"\n", b"0", b"-")
-OTHERS = (b"", b",", b";", b"e9", b"\r")
-STRANGE = (b"1e308", b"nan", b"-inf", b"9" * 400, b'"', b"\xff\xfe", b"\xef\xbb\xbf")
-
-
-def mutated(data: bytes, draw: random.Random) -> bytes:
-    """Change a file as disks, wires and people do."""
-    place, size = draw.randrange(len(data)), 1 + int(draw.expovariate(1 / 40))
-    ways: list[Callable[[], bytes]] = [
-        lambda: data[:place],
-        lambda: data[:place] + data[place + size :],
-        lambda: data[:place] + draw.randbytes(size) + data[place:],
-        lambda: data[:place] + bytes(size) + data[place + size :],
-        lambda: data[:place] + bytes([data[place] ^ (1 << draw.randrange(8))]) + data[place + 1 :],
-        lambda: data[:place] + data[place : place + size] * draw.randrange(2, 50) + data[place + size :],
-        lambda: data.replace(draw.choice(SIGNS), draw.choice(OTHERS)),
-        lambda: data[:place] + draw.choice(STRANGE) + data[place:],
-        lambda: b"\n".join(draw.sample(lines, len(lines))) if len(lines := data.split(b"\n")) < 2000 else data[1:],
-        lambda: data.decode("latin-1").encode("utf-16"),
-    ]  # fmt: skip
-    return draw.choice(ways)()
-
-
 def originals(folder: Path) -> list[tuple[str, bytes]]:
     """Small files of every kind that can be written here."""
-    from scipy.io import savemat
-
-    found = [
-        (path.name, path.read_bytes()) for path in sorted(SAMPLES.iterdir()) if path.is_file() and path.suffix != ".py"
-    ]
     Recording("run", TABLE, {"t": "s", "q": "rad"}).write(folder / "run.parquet")
     Recording("run", TABLE).write(folder / "run.csv.gz")
     savemat(folder / "run.mat", TABLE, do_compression=True)
-    found += [(name, (folder / name).read_bytes()) for name in ("run.parquet", "run.csv.gz", "run.mat")]
-    if importlib.util.find_spec("h5py"):
-        import h5py
-
-        with h5py.File(folder / "run.h5", "w") as file:
-            for name, column in TABLE.items():
-                file[name] = column
-        found.append(("run.h5", (folder / "run.h5").read_bytes()))
-    return found
+    with h5py.File(folder / "run.h5", "w") as file:
+        for name, column in TABLE.items():
+            file[name] = column
+    files = [path for path in sorted(SAMPLES.iterdir()) if path.is_file() and path.suffix != ".py"]
+    return [(path.name, path.read_bytes()) for path in (*files, *folder.iterdir())]
 
 
 @pytest.mark.filterwarnings("ignore")
 def test_three_hundred_damaged_files_end_in_a_recording_or_a_sentence(tmp_path: Path) -> None:
-    draw, read = random.Random(17), 0
+    draw, read = np.random.default_rng(17), 0
     with bounded(800):
         files = originals(tmp_path)
         for number in range(300):
             name, data = files[number % len(files)]
-            for _ in range(1 + draw.randrange(3)):
-                data = mutated(data, draw) or b"\n"
-            path = written(tmp_path / f"{number}_{name}", data)
+            path = written(tmp_path / f"{number}_{name}", damaged(data, draw))
             try:
                 recording = preview(path).recording
                 assert np.isfinite(np.stack([recording[one] for one in recording])).all()
@@ -261,10 +236,3 @@ def test_a_formula_in_a_file_runs_only_if_it_is_arithmetic(tmp_path: Path, formu
     else:
         with pytest.raises(RecordingError, match="converted by a formula that is no plain arithmetic"):
             Recording.read(tmp_path / "run.mf4")
-
-
-def test_parquet_of_too_many_columns_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "COLUMNS", 50)
-    parquet.write_table(pa.table({f"c{number}": [1.0] for number in range(60)}), tmp_path / "run.parquet")
-    with pytest.raises(RecordingError, match=r"has 60 columns; a recording has at most 50\."):
-        Recording.read(tmp_path / "run.parquet")

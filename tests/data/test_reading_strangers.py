@@ -22,78 +22,98 @@ TAU = 1.5 * np.cos(3 * T)
 DEG = np.degrees(1)
 
 
-@pytest.mark.parametrize(
-    ("name", "stated"), [("torque [%]", "%"), ("torque_permille", "0.1 %"), ("torque (‰)", "0.1 %")]
-)
-def test_a_share_of_the_rated_torque_is_asked_for(tmp_path: Path, name: str, stated: str) -> None:
-    path = written(tmp_path / "run.csv", f"t,{name},position", T, TAU, Q)
-    with pytest.raises(UndecidedError, match=f'is in {stated} of a torque .* for example --units "tau=0.04 N.m"'):
+DAYS = [f"{45352.5 + t / 86400:.11f}" for t in T]
+SECONDS = [f"2024-03-01 12:00:{int(10 * t):02d}" for t in T]
+SHARE = {"units": {"tau": "0.04 N.m"}}
+ASKED = [
+    *(
+        (f"t,{name},position", (T, TAU, Q), rf'is in {stated} of a torque .*"tau=0.04 N.m"', SHARE, (T, 0.04 * TAU))
+        for name, stated in (("torque [%]", "%"), ("torque_permille", "0.1 %"), ("torque (‰)", "0.1 %"))
+    ),
+    ("time,torque,pos", (DAYS, TAU, Q), r"200 Hz in days\. .* --units t=day, or", {"units": {"t": "day"}}, (T, TAU)),
+    ("time,torque,pos", (SECONDS, TAU, Q), "period=50ms", {"layout": {"period": "50ms"}}, (10 * T, TAU)),
+    ("", ([""] * ROWS, T, TAU, Q), r"t=#2 tau=#3 q=#4\.", {"columns": {"t": "#2", "tau": "#3", "q": "#4"}}, (T, TAU)),
+]
+"""Names, columns, what is asked, an answer, and time and torque that are read then."""
+
+
+@pytest.mark.parametrize(("header", "columns", "sentence", "answer", "expected"), ASKED)
+def test_what_a_file_leaves_open_is_asked_and_the_answer_counts(
+    tmp_path: Path, header: str, columns: tuple, sentence: str, answer: dict, expected: tuple[np.ndarray, ...]
+) -> None:
+    path = written(tmp_path / "run.csv", header, *columns)
+    with pytest.raises(UndecidedError, match=sentence):
         Recording.read(path)
-    np.testing.assert_allclose(Recording.read(path, units={"tau": "0.04 N.m"})["tau"], 0.04 * TAU, atol=1e-8)
+    read = Recording.read(path, **answer)
+    np.testing.assert_allclose([read.t - read.t[0], read["tau"]], expected, atol=2e-6)
+    np.testing.assert_allclose(read["q"], Q, atol=1e-8)
 
 
-def test_a_unit_that_is_not_known_costs_nothing_where_its_column_is_not_used(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "t,torque [Nm],position [rad],lost motion [reference unit]", T, TAU, Q, Q)
-    read = Recording.read(path)
-    assert read.units.get("lost motion", "") == ""
-    np.testing.assert_allclose(read["lost motion"], Q, atol=1e-8)
+LARGE = [f'"{1e6 * x:,.1f}"' for x in TAU]
+PLAIN = [[f"{x:.9f}" for x in column] for column in (T, TAU, Q)]
+GERMAN = [[x.strip('"').translate(str.maketrans(",.", ".,")) for x in one] for one in (PLAIN[0], LARGE, PLAIN[2])]
+QUOTED = [[f'"{x}"'.replace(".", ",") for x in column] for column in PLAIN]
+CLOCKS = {sign: [f"12:00:{int(t):02d}{sign}{round(1e3 * t) % 1000}" for t in T] for sign in ";:"}
+PREAMBLE = "Written by a tool\nDate;2024/03/01\n{};mN.m;deg\nEnd of header\nt;torque;angle"
+ODRIVE = "time,axis0.pos_vel_mapper.pos_rel,axis0.controller.effective_torque_setpoint"
+READ = {
+    "a unit that is not known, of a column that is not used": (
+        "t,torque [Nm],position [rad],lost motion [reference unit]",
+        (T, TAU, Q, Q),
+        TAU,
+        Q,
+    ),
+    "the last part of a path": ("time,axis.vel_mapper.pos,axis.pos_loop.torque_ref", (T, Q, TAU), TAU, Q),
+    "relative positions of an ODrive, in turns": (ODRIVE, (T, Q, TAU), TAU, 2 * np.pi * Q),
+    "milliseconds behind a time and a semicolon": ("Time,torque,position", (CLOCKS[";"], TAU, Q), TAU, Q),
+    "milliseconds behind a time and a colon": ("Time,torque,position", (CLOCKS[":"], TAU, Q), TAU, Q),
+    "thousands parted by quoted commas": ("t,torque [uN.m],q", (T, LARGE, Q), TAU, Q),
+    "thousands parted by points beside decimal commas": ("t;torque [uN.m];q", GERMAN, TAU, Q),
+    "quoted decimal commas between commas": ("t,torque,q", QUOTED, TAU, Q),
+    **{
+        f"units column by column behind {word}": (PREAMBLE.format(word), (T, TAU, Q), 1e-3 * TAU, Q / DEG)
+        for word in ("Y_Unit_Label", "Vertical Units", "unit", "Einheit")
+    },
+}
+"""Names and columns; torque and position that are meant."""
+
+
+@pytest.mark.parametrize("what", READ)
+def test_what_a_stranger_writes_is_read_as_it_was_meant(tmp_path: Path, what: str) -> None:
+    header, columns, tau, q = READ[what]
+    read = Recording.read(written(tmp_path / "run.csv", header, *columns, sep=";" if ";" in header else ","))
+    np.testing.assert_allclose(read.t - read.t[0], T, atol=1e-8)
+    np.testing.assert_allclose([read["tau"], read["q"]], [tau, q], atol=1e-7)
+    assert set(read) - {"t", "tau", "q"} == ({"lost motion"} if "lost motion" in header else set())
+
+
+def test_a_single_group_is_no_thousand() -> None:
+    assert grouped(np.array(["1,931", "2,125"], dtype=object), ".").dtype == object
 
 
 @pytest.mark.parametrize(
-    ("text", "newton_metres"),
+    ("text", "size", "si"),
     [
-        ("oz-in", 0.0070615518),
-        ("ozf·in", 0.0070615518),
-        ("lb-ft", 1.3558179),
-        ("ft.lbf", 1.3558179),
-        ("lbf in", 0.11298483),
-        ("kgf.cm", 0.0980665),
-        ("Newton-Meter", 1.0),
-        ("mNewtonMeter", 1e-3),
-        ("NM", 1.0),
+        ("oz-in", 0.0070615518, "N.m"),
+        ("ozf·in", 0.0070615518, "N.m"),
+        ("lb-ft", 1.3558179, "N.m"),
+        ("ft.lbf", 1.3558179, "N.m"),
+        ("lbf in", 0.11298483, "N.m"),
+        ("kgf.cm", 0.0980665, "N.m"),
+        ("Newton-Meter", 1.0, "N.m"),
+        ("mNewtonMeter", 1e-3, "N.m"),
+        ("NM", 1.0, "N.m"),
+        ("Grad", np.pi / 180, "rad"),
+        ("GRAD", np.pi / 180, "rad"),
+        ("gon", np.pi / 200, "rad"),
+        ("DEG", np.pi / 180, "rad"),
+        ("′", np.pi / 10800, "rad"),
     ],
 )
-def test_torques_of_other_countries_are_known(text: str, newton_metres: float) -> None:
+def test_torques_and_angles_of_other_countries_and_tools_are_known(text: str, size: float, si: str) -> None:
     known = unit(spelled(text))
-    assert known.factor == pytest.approx(newton_metres, rel=1e-6)
-    assert known.dimension == unit("N.m").dimension
-
-
-@pytest.mark.parametrize(
-    ("text", "radians"),
-    [("Grad", np.pi / 180), ("GRAD", np.pi / 180), ("gon", np.pi / 200), ("DEG", np.pi / 180), ("′", np.pi / 10800)],
-)
-def test_angles_as_other_tools_write_them_are_known(text: str, radians: float) -> None:
-    assert unit(spelled(text)).factor == pytest.approx(radians, rel=1e-9)
-
-
-def test_the_last_part_of_a_path_tells_what_it_is(tmp_path: Path) -> None:
-    names = "time,axis.vel_mapper.pos,axis.pos_loop.torque_ref"
-    read = Recording.read(written(tmp_path / "run.csv", names, T, Q, TAU))
-    assert "v" not in read
-    np.testing.assert_allclose([read["q"], read["tau"]], [Q, TAU], atol=1e-8)
-
-
-def test_relative_positions_of_an_odrive_are_in_turns(tmp_path: Path) -> None:
-    names = "time,axis0.pos_vel_mapper.pos_rel,axis0.controller.effective_torque_setpoint,axis0.controller.input_pos"
-    read = Recording.read(written(tmp_path / "run.csv", names, T, Q, TAU, Q))
-    np.testing.assert_allclose(read["q"], 2 * np.pi * Q, atol=1e-8)
-    np.testing.assert_allclose(read["q_d"], 2 * np.pi * Q, atol=1e-8)
-
-
-def test_days_of_a_spreadsheet_are_no_seconds(tmp_path: Path) -> None:
-    days = [f"{45352.5 + t / 86400:.11f}" for t in T]
-    path = written(tmp_path / "run.csv", "time,torque,position", days, TAU, Q)
-    with pytest.raises(UndecidedError, match=r"200 Hz in days\. Say which with --units t=day, or --units t=s\."):
-        Recording.read(path)
-    assert Recording.read(path, units={"t": "day"}).sample_time == pytest.approx(5e-3, rel=1e-3)
-
-
-@pytest.mark.parametrize("sign", [";", ":"])
-def test_milliseconds_behind_a_time_are_counted(tmp_path: Path, sign: str) -> None:
-    clock = [f"12:00:{int(t):02d}{sign}{round(1e3 * t) % 1000}" for t in T]
-    read = Recording.read(written(tmp_path / "run.csv", "Time,torque,position", clock, TAU, Q))
-    np.testing.assert_allclose(read.t, T, atol=1e-9)
+    assert known.factor == pytest.approx(size, rel=1e-7)
+    assert known.dimension == unit(si).dimension
 
 
 def test_names_that_stand_again_are_left_out_and_a_new_time_is_another_recording(tmp_path: Path) -> None:
@@ -110,31 +130,6 @@ def test_names_that_stand_again_are_left_out_and_a_new_time_is_another_recording
     np.testing.assert_allclose(Recording.read(f"{path}:#2")["q"], Q[:half], atol=1e-8)
 
 
-def test_thousands_may_be_parted_where_that_is_certain(tmp_path: Path) -> None:
-    large = [f'"{1e6 * x:,.1f}"' for x in TAU]
-    read = Recording.read(written(tmp_path / "run.csv", "t,torque [uN.m],q", T, large, Q))
-    np.testing.assert_allclose(read["tau"], TAU, atol=1e-7)
-    german = [text.strip('"').translate(str.maketrans(",.", ".,")) for text in large]
-    columns = [[f"{x:.9f}".replace(".", ",") for x in column] for column in (T, Q)]
-    path = written(tmp_path / "run.csv", "t;torque [uN.m];q", columns[0], german, columns[1], sep=";")
-    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-7)
-
-
-def test_quoted_decimal_commas_between_commas_are_read_and_a_single_group_is_no_thousand(tmp_path: Path) -> None:
-    columns = [[f'"{x:.6f}"'.replace(".", ",") for x in column] for column in (T, TAU, Q)]
-    read = Recording.read(written(tmp_path / "run.csv", "t,torque,q", *columns))
-    np.testing.assert_allclose([read["tau"], read["q"]], [TAU, Q], atol=1e-6)
-    assert grouped(np.array(["1,931", "2,125"], dtype=object), ".").dtype == object
-
-
-def test_a_time_of_too_few_digits_names_the_period(tmp_path: Path) -> None:
-    seconds = [f"2024-03-01 12:00:{int(10 * t):02d}" for t in T]
-    path = written(tmp_path / "run.csv", "timestamp,torque,position", seconds, TAU, Q)
-    with pytest.raises(UndecidedError, match="if the rows are evenly spaced, say --layout period=50ms"):
-        Recording.read(path)
-    assert Recording.read(path, layout={"period": "50ms"}).sample_time == pytest.approx(0.05)
-
-
 @pytest.mark.parametrize("word", ["---", "#NV", "-nan(ind)", "n.a."])
 def test_words_for_no_value_are_told_and_cost_no_other_column(tmp_path: Path, word: str) -> None:
     holes = [word if row % 90 == 5 else f"{x:.6f}" for row, x in enumerate(TAU)]
@@ -142,21 +137,6 @@ def test_words_for_no_value_are_told_and_cost_no_other_column(tmp_path: Path, wo
     assert "load" not in read
     with pytest.raises(RecordingError, match=r"holds nan at row 6, which is not a finite number \(5 such rows\)"):
         Recording.read(written(tmp_path / "run.csv", "t,tau,q", T, holes, Q))
-
-
-def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text("\n".join(f";{t:.4f};{tau:.6f};{q:.6f}" for t, tau, q in zip(T, TAU, Q, strict=True)))
-    with pytest.raises(UndecidedError, match=r"--columns t=#2 tau=#3 q=#4\."):
-        Recording.read(path)
-
-
-@pytest.mark.parametrize("word", ["Y_Unit_Label", "Vertical Units", "unit", "Einheit"])
-def test_units_that_a_preamble_gives_column_by_column_are_those_of_the_columns(tmp_path: Path, word: str) -> None:
-    header = f"Written by a tool\nDate;2024/03/01\n{word};mN.m;deg\nEnd of header\nt;torque;angle"
-    read = Recording.read(written(tmp_path / "run.csv", header, T, TAU, Q, sep=";"))
-    np.testing.assert_allclose(read["tau"], 1e-3 * TAU, atol=1e-9)
-    np.testing.assert_allclose(read["q"], Q / DEG, atol=1e-8)
 
 
 def test_a_channel_in_volts_is_no_torque_until_its_scale_is_given(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Text is read however a machine wrote it; what can be read in two ways is refused, and the option is named."""
+"""Text is read as it was meant, however a machine, a tool or a person wrote it."""
 
 import re
 from collections.abc import Sequence
@@ -6,297 +6,198 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import rows
 
 from cosim.data.recording import Recording
-from cosim.data.text.names import split_unit, suffixed_unit
-from cosim.reading import read_recordings
-from cosim.support.errors import InputError, RecordingError
 
-ROWS = 3000
-T = np.arange(ROWS) * 1e-3
+T = np.arange(3000) * 1e-3
 TAU, Q = 2 * np.cos(7 * T), 0.1 * np.sin(7 * T)
+RAD = (T, TAU, Q)
+DEG = 180 / np.pi
+DEGREES = (*RAD[:2], RAD[2] / DEG)
+T15 = np.arange(1500) / 1500.0
+"""1.5 kHz for one second: in ms a step of 0.667, which may be taken for seconds."""
+RAPID = (T15, 1.5 * np.cos(8 * T15 + 0.4), np.sin(8 * T15))
+MS = (1e3 * T15, *RAPID[1:])
+LONG = np.arange(1500) / 500.0
+QL, VL, TAUL = np.sin(3 * LONG), 3 * np.cos(3 * LONG), 1.5 * np.cos(3 * LONG + 0.4)
+S = (LONG, TAUL, QL)
 
 
-def rows(separator: str, decimal: str = ".", columns: Sequence[np.ndarray] = (T, TAU, Q), end: str = "") -> str:
-    lines = (separator.join(f"{x:.9g}".replace(".", decimal) for x in row) + end for row in zip(*columns, strict=True))
-    return "\n".join(lines) + "\n"
+def three(separator: str, decimal: str = ".", columns: Sequence[np.ndarray] = RAD, end: str = "") -> str:
+    return rows(*columns, separator=separator, decimal=decimal, end=end)
 
 
 def stamps(first: str) -> list[str]:
     start = np.datetime64(first, "ms")
-    return [str(start + np.timedelta64(row, "ms")) for row in range(ROWS)]
+    return [str(start + np.timedelta64(row, "ms")) for row in range(len(T))]
 
 
-def dated(times: Sequence[str], separator: str = ",", decimal: str = ".") -> str:
-    lines = (f"{t}{separator}{tau:.9f}{separator}{q:.9f}" for t, tau, q in zip(times, TAU, Q, strict=True))
-    return "\n".join(line.replace(".", decimal) if decimal != "." else line for line in lines) + "\n"
+def dated(times: Sequence[str], separator: str = ",") -> str:
+    return rows(times, TAU, Q, separator=separator)
 
 
-def written(path: Path, text: str | bytes) -> Path:
-    path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return path
+MITSUBISHI = "Axis1\nNumber of sampling data,4\nSampling time interval(ms),0.667\n"
+TEK = [["Record Length", "2500", ""], ["Sample Interval", "4e-5", ""], ["Source", "CH1", ""]]
+BESIDE = [TEK[row] if row < len(TEK) else ["", "", ""] for row in range(len(LONG))]
 
-
-DEG = np.pi / 180
 GERMAN = [f"{t[8:10]}.{t[5:7]}.{t[:4]} {t[11:]}" for t in stamps("2024-03-01T23:59:58")]
 READ = {
-    "semicolons and decimal commas": ("t;tau;q\n" + rows(";", ","), 1.0),
-    "tabs": ("t\ttau\tq\n" + rows("\t"), 1.0),
-    "tabs and decimal commas": ("Zeit [s]\tDrehmoment [Nm]\tWinkel [°]\n" + rows("\t", ","), DEG),
-    "bars": ("t|tau|q\n" + rows("|"), 1.0),
-    "blanks under a commented header": ("# t tau q\n" + rows("  "), 1.0),
-    "a commented header with commas": ("# t,tau,q\n" + rows(","), 1.0),
-    "units in round brackets": ("t,tau (Nm),q (deg)\n" + rows(","), DEG),
-    "units as a standard divides them": ("t / s;M / Nm;phi / deg\n" + rows(";", ","), DEG),
-    "units at the end of names": ("time_s,Torque_Nm,pos_deg\n" + rows(","), DEG),
-    "a row of units": ("Time;Torque;Position\ns;Nm;deg\n" + rows(";", ","), DEG),
-    "a row of units in brackets": ("Time,Torque,Position\n[s],[Nm],[deg]\n" + rows(","), DEG),
-    "a preamble": ("Logger 7\nSerial,123\nDate,2024-03-01\n\nTime,Torque,Position\n" + rows(","), 1.0),
-    "a preamble that ends with as many numbers": ("1000,0.001,5\nt,tau,q\n" + rows(","), 1.0),
-    "a preamble of two lines of numbers": ("Logger 7\n12;1;0,5\n13;2;0,5\n\nt;tau;q\n" + rows(";", ","), 1.0),
-    "a separator at the end of each row": ("t;tau;q;\n" + rows(";", end=";"), 1.0),
-    "quoted numbers": ('"t";"tau";"q"\n"' + rows('";"', ",", end='"').replace("\n", '\n"').rstrip('"'), 1.0),
-    "a byte order mark": ("\ufefft,tau,q\n" + rows(","), 1.0),
-    "UTF-16": (("t,tau,q\n" + rows(",")).encode("utf-16"), 1.0),
-    "UTF-16 without a mark": (("t,tau,q\n" + rows(",")).encode("utf-16-le"), 1.0),
-    "cp1252": (("t;tau;q [°]\n" + rows(";", ",")).encode("cp1252"), DEG),
-    "lines that end as on an old Macintosh": (("t,tau,q\n" + rows(",")).replace("\n", "\r"), 1.0),
-    "lines that end as on Windows": (("t,tau,q\n" + rows(",")).replace("\n", "\r\n"), 1.0),
-    "milliseconds": ("t,tau,q\n" + rows(",", columns=(T * 1e3, TAU, Q)), 1.0),
-    "microseconds": ("t,tau,q\n" + rows(",", columns=(np.arange(ROWS) * 1000, TAU, Q)), 1.0),
+    # separators, numbers, lines, dates
+    "semicolons and decimal commas": ("t;tau;q\n" + three(";", ","), RAD),
+    "tabs": ("t\ttau\tq\n" + three("\t"), RAD),
+    "tabs and decimal commas": ("Zeit [s]\tDrehmoment [Nm]\tWinkel [°]\n" + three("\t", ","), DEGREES),
+    "bars": ("t|tau|q\n" + three("|"), RAD),
+    "blanks under a commented header": ("# t tau q\n" + three("  "), RAD),
+    "a commented header with commas": ("# t,tau,q\n" + three(","), RAD),
+    "units in round brackets": ("t,tau (Nm),q (deg)\n" + three(","), DEGREES),
+    "units as a standard divides them": ("t / s;M / Nm;phi / deg\n" + three(";", ","), DEGREES),
+    "units at the end of names": ("time_s,Torque_Nm,pos_deg\n" + three(","), DEGREES),
+    "a row of units": ("Time;Torque;Position\ns;Nm;deg\n" + three(";", ","), DEGREES),
+    "a row of units in brackets": ("Time,Torque,Position\n[s],[Nm],[deg]\n" + three(","), DEGREES),
+    "a preamble": ("Logger 7\nSerial,123\nDate,2024-03-01\n\nTime,Torque,Position\n" + three(","), RAD),
+    "a preamble that ends with as many numbers": ("1000,0.001,5\nt,tau,q\n" + three(","), RAD),
+    "a preamble of two lines of numbers": ("Logger 7\n12;1;0,5\n13;2;0,5\n\nt;tau;q\n" + three(";", ","), RAD),
+    "a separator at the end of each row": ("t;tau;q;\n" + three(";", end=";"), RAD),
+    "quoted numbers": ('"t";"tau";"q"\n"' + three('";"', ",", end='"').replace("\n", '\n"').rstrip('"'), RAD),
+    "a byte order mark": ("\ufefft,tau,q\n" + three(","), RAD),
+    "UTF-16": (("t,tau,q\n" + three(",")).encode("utf-16"), RAD),
+    "UTF-16 without a mark": (("t,tau,q\n" + three(",")).encode("utf-16-le"), RAD),
+    "cp1252": (("t;tau;q [°]\n" + three(";", ",")).encode("cp1252"), DEGREES),
+    "lines that end as on an old Macintosh": (("t,tau,q\n" + three(",")).replace("\n", "\r"), RAD),
+    "lines that end as on Windows": (("t,tau,q\n" + three(",")).replace("\n", "\r\n"), RAD),
+    "milliseconds": ("t,tau,q\n" + three(",", columns=(T * 1e3, TAU, Q)), RAD),
+    "microseconds": ("t,tau,q\n" + three(",", columns=(1_000_000 * T, TAU, Q)), RAD),
     "nanoseconds since 1970": (
-        "t,tau,q\n" + dated([str(1_709_331_184_123_456_789 + k * 10**6) for k in range(ROWS)]),
-        1.0,
+        "t,tau,q\n" + dated([str(1_709_331_184_123_456_789 + k * 10**6) for k in range(len(T))]),
+        RAD,
     ),
-    "milliseconds since 1970": ("t,tau,q\n" + dated([str(1_709_331_184_123 + k) for k in range(ROWS)]), 1.0),
-    "ISO time stamps": ("timestamp,torque,angle\n" + dated(stamps("2024-03-01T23:59:59")), 1.0),
-    "ISO time stamps with a zone": ("time,tau,q\n" + dated([f"{t}+01:00" for t in stamps("2024-03-01T22:00:00")]), 1.0),
-    "German dates": ("Uhrzeit;Moment;Lage\n" + dated(GERMAN, ";").replace("|", ";"), 1.0),
+    "milliseconds since 1970": ("t,tau,q\n" + dated([str(1_709_331_184_123 + k) for k in range(len(T))]), RAD),
+    "ISO time stamps": ("timestamp,torque,angle\n" + dated(stamps("2024-03-01T23:59:59")), RAD),
+    "ISO time stamps with a zone": ("time,tau,q\n" + dated([f"{t}+01:00" for t in stamps("2024-03-01T22:00:00")]), RAD),
+    "German dates": ("Uhrzeit;Moment;Lage\n" + dated(GERMAN, ";"), RAD),
     "German dates and decimal commas": (
         "Zeit;Moment;Lage\n"
-        + "".join(f"{t};{x}" for t, x in zip(GERMAN, rows(";", ",", (TAU, Q)).splitlines(True), strict=True)),
-        1.0,
+        + "".join(f"{t};{x}" for t, x in zip(GERMAN, three(";", ",", (TAU, Q)).splitlines(True), strict=True)),
+        RAD,
     ),
-    "a clock past midnight": ("time,tau,q\n" + dated([t[11:] for t in stamps("2024-03-01T23:59:59")]), 1.0),
+    "a clock past midnight": ("time,tau,q\n" + dated([t[11:] for t in stamps("2024-03-01T23:59:59")]), RAD),
     "names that say command and actual": (
-        "time,torque_cmd,torque_act,pos_act,pos_cmd,pos_error\n" + rows(",", columns=(T, TAU, -TAU, Q, 2 * Q, Q)),
-        1.0,
+        "time,torque_cmd,torque_act,pos_act,pos_cmd,pos_error\n" + three(",", columns=(T, TAU, -TAU, Q, 2 * Q, Q)),
+        RAD,
     ),
-    "a word at the end": ("t,tau,q\n" + rows(",") + "EOF\n", 1.0),
-}  # fmt: skip
+    "a word at the end": ("t,tau,q\n" + three(",") + "EOF\n", RAD),
+    # a factor of 1000: the time
+    "a time called ms": ("ms,torque,position\n" + rows(*MS), RAPID),
+    "a time called ms below a preamble": ("drive 7\n\nms;torque;position\n" + rows(*MS, separator=";"), RAPID),
+    "a time called millisec": ("millisec,torque,position\n" + rows(*MS), RAPID),
+    "a time called timeMs": ("timeMs,torqueNm,posRad\n" + rows(*MS), RAPID),
+    "a time called t_msec": ("t_msec,torque,position\n" + rows(*MS), RAPID),
+    "a time called elapsed ms": ("elapsed ms since start,torque,position\n" + rows(*MS), RAPID),
+    "ms in braces": ("t {ms},torque {Nm},position {rad}\n" + rows(*MS), RAPID),
+    "ms behind a comma": ('"time, ms","torque, Nm","position, rad"\n' + rows(*MS), RAPID),
+    "ms in a second row": ("t,tau,q\nms,N.m,rad\n" + rows(*MS), RAPID),
+    "ms in a row above the names": ("[ms],[Nm],[rad]\nt,tau,q\n" + rows(*MS), RAPID),
+    "ms in a row of units of which one is not known": ("t,tau,q,load\nms,Nm,rad,wobble\n" + rows(*MS, MS[2]), RAPID),
+    "units alone": ("ms,Nm,rad\n" + rows(*MS), RAPID),
+    "units alone in brackets": ("[ms];[Nm];[rad]\n" + rows(*MS, separator=";"), RAPID),
+    "units in front of an unnamed time": (
+        MITSUBISHI + "Time,Analog 1,Analog 2\nms,Position,Torque\n" + rows(MS[0], MS[2], MS[1]),
+        RAPID,
+    ),
+    "milliseconds whose letters shout": ("Time [MS],Torque [NM],Pos [RAD]\n" + rows(*MS), RAPID),
+    "units of a preamble, column by column": ("Unit,ms,Nm,rad\nt,tau,q\n" + rows(*MS), RAPID),
+    # a factor of 1000: position and torque
+    "mrad": ("t,tau,q [mrad]\n" + rows(LONG, TAUL, 1e3 * QL), S),
+    "mdeg behind a name": ("t,tau,pos_mdeg\n" + rows(LONG, TAUL, 1e3 * DEG * QL), S),
+    "thousandths of a degree": ("t,torque,position [0.001°]\n" + rows(LONG, TAUL, 1e3 * DEG * QL), S),
+    "mN.m behind a blank": ("t,torque mNm,position rad\n" + rows(LONG, 1e3 * TAUL, QL), S),
+    "mN.m in a second row": ("t,tau,q\ns,mN·m,mrad\n" + rows(LONG, 1e3 * TAUL, 1e3 * QL), S),
+    "thousandths whose unit has a capital": ("t,tau,pos_mDeg\n" + rows(LONG, TAUL, 1e3 * DEG * QL), S),
+    "thousandths of German degrees": (
+        "Zeit (sek.);Drehmoment (mNm);Winkel (mGrad)\n" + rows(LONG, 1e3 * TAUL, 1e3 * DEG * QL, separator=";"),
+        S,
+    ),
+    "a position beside its slope": ("time,effort,theta1,theta1_dot\n" + rows(*S, VL), S),
+    "microradians": ("t,tau,angle_urad\n" + rows(LONG, TAUL, 1e6 * QL), S),
+    # names
+    "names with blanks, parted by two": ("time   motor torque   encoder position\n" + rows(*S, separator=" "), S),
+    "names with blanks, parted by tabs": ("time\tmotor torque\tencoder position\n" + rows(*S, separator=" "), S),
+    "names with blanks and units": ("time [s] motor torque [Nm] encoder position [rad]\n" + rows(*S, separator=" "), S),
+    "names parted by commas above blanks": ("time, motor torque, position\n" + rows(*S, separator="  "), S),
+    "a percent sign before the names": ("% time  torque  position\n" + rows(*S, separator=" "), S),
+    "rows numbered without a name": (
+        "torque position time\n"
+        + "".join(f'"{k}" {line}\n' for k, line in enumerate(rows(TAUL, QL, LONG, separator=" ").splitlines(), 1)),
+        S,
+    ),
+    "a row of types": ("time,torque,position\nLREAL,LREAL,LREAL\n" + rows(*S), S),
+    "groups above the names": (
+        ",axis 1,,axis 2,\ntime,torque,position,torque,position\n" + rows(LONG, TAUL, QL, 2 * TAUL, 2 * QL),
+        S,
+        {"columns": {"tau": "axis 1.torque", "q": "axis 1.position"}},
+    ),
+    "names and the first row in one line": ("t,tau,q," + rows(*S), S),
+    "names and the first row in one line of blanks": ("time torque position " + rows(*S, separator=" "), S),
+    "names in single quotes": ("'t';'tau';'q'\n" + rows(*S, separator=";"), S),
+    "names that end with a carriage return alone": ("t,tau,q\r" + rows(*S), S),
+    "lines that end with two carriage returns": (("t,tau,q\n" + rows(*S)).replace("\n", "\r\r\n"), S),
+    "empty cells behind the names": ("Time[s],Torque[Nm],Position[rad],,,,,\n" + rows(*S), S),
+    "empty cells behind names without units": ("Time,Torque,Position,,,,,\n" + rows(*S), S),
+    # signs around the numbers
+    "semicolons at the end of rows of blanks": ("% t tau q\n" + rows(*S, separator=" ", end=";"), S),
+    "semicolons at the end of rows of commas": ("%t,tau,q\n" + rows(*S, end=";"), S),
+    "a matrix of MATLAB": (
+        "% t tau q\nlog = [\n" + rows(*S, separator=" ", end=";") + "];\n",
+        S,
+    ),
+    "comments between the rows": (
+        "t tau q\n" + re.sub(r"(?m)^(0\.5 .*)$", r"% the load 1\n\1", rows(*S, separator=" ")),
+        S,
+    ),
+    "comments behind the rows": ("t tau q\n" + rows(*S, separator=" ", end=" % fine"), S),
+    "a last column that is often missing": (
+        "t,tau,q,remark\n" + "".join(f"{one}{',9' * (k % 3 == 0)}\n" for k, one in enumerate(rows(*S).splitlines())),
+        S,
+    ),
+    "a last column of words": (
+        "t,tau,q,state\n" + rows(*S, ["RUN" if k % 5 else "FAULT 7" for k in range(len(LONG))]),
+        S,
+    ),
+    # tables
+    "a signal a line": (rows(("t", "tau", "q"), *zip(*S, strict=True)), S),
+    "a signal a line with its unit": (rows(("t,ms", "tau,Nm", "q,rad"), *zip(*MS, strict=True)), RAPID),
+    "a signal a line with the unit in its name": (
+        rows(("t [ms]", "tau", "q"), *zip(1e3 * LONG, TAUL, QL, strict=True)),
+        S,
+    ),
+    "cells beside the samples": (
+        rows(*zip(*BESIDE, strict=True), LONG, TAUL, QL),
+        S,
+        {"columns": {"t": "#4", "tau": "#5", "q": "#6"}},
+    ),
+    # what a person states counts
+    "the line of the names": ("a,b,c\nt,tau,q\nx,y,z\n" + three(","), RAD, {"layout": {"header": "2"}}),
+    "separator and decimal sign": (
+        "t;tau;q\n" + three(";", ","),
+        RAD,
+        {"layout": {"separator": "semicolon", "decimal": "comma"}},
+    ),
+    "seconds that are stated": ("t [s],tau,q\n" + rows(1e3 * T, TAU, Q), (1e3 * T, TAU, Q)),
+    "the unit in a name where its owner says which column it is": (
+        "ms,a_mNm,b [mdeg]\n" + rows(MS[0], 1e3 * MS[1], 1e3 * DEG * MS[2]),
+        RAPID,
+        {"columns": {"t": "ms", "tau": "a_mNm", "q": "b"}},
+    ),
+}
+"""Text, (t, tau, q) that are meant, and the options that a person would have to give."""
 
 
 @pytest.mark.parametrize("how", READ)
 def test_a_table_is_read_as_it_was_meant(tmp_path: Path, how: str) -> None:
-    text, angle = READ[how]
-    recording = Recording.read(written(tmp_path / "run.csv", text))
-    np.testing.assert_allclose(recording.t - recording.t[0], T, atol=1e-9)
-    np.testing.assert_allclose(recording["tau"], TAU, atol=1e-8)
-    np.testing.assert_allclose(recording["q"], angle * Q, atol=1e-8)
-
-
-def test_a_set_point_is_found_where_names_have_to_be_read(tmp_path: Path) -> None:
-    recording = Recording.read(written(tmp_path / "run.csv", READ["names that say command and actual"][0]))
-    np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
-    said = " ".join(recording.notes)
-    assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"' in said
-    assert 'no unit is stated for "torque_cmd" (tau in N.m or N), "pos_act" (q in rad or m)' in said
-    assert "were left out: torque_act." in said
-
-
-def test_where_our_own_names_stand_only_a_set_point_of_another_name_is_read(tmp_path: Path) -> None:
-    text = "t,tau,q,setpoint_position,motor_temperature\n" + rows(",", columns=(T, TAU, Q, 2 * Q, TAU))
-    recording = Recording.read(written(tmp_path / "run.csv", text))
-    assert recording.columns == ("t", "tau", "q", "q_d", "motor_temperature")
-    np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
-    assert ['q_d = "setpoint_position"; --columns says it otherwise.' in note for note in recording.notes] == [True]
-
-
-@pytest.mark.parametrize("names", ["q_d,q_ref", "q_ref,q_cmd"])
-def test_of_two_set_points_none_is_guessed(tmp_path: Path, names: str) -> None:
-    text = f"t,tau,q,{names}\n" + rows(",", columns=(T, TAU, Q, 2 * Q, 3 * Q))
-    recording = Recording.read(written(tmp_path / "run.csv", text))
-    assert recording.columns == ("t", "tau", "q", *names.split(","))
-    assert recording.notes == ()
-
-
-def test_when_a_recording_began_is_kept(tmp_path: Path) -> None:
-    recording = Recording.read(written(tmp_path / "run.csv", READ["ISO time stamps"][0]))
-    assert recording.origin["start"] == "2024-03-01T23:59:59.000"
-
-
-REFUSED = {
-    "no names": (rows(","), "does not name its 3 columns; say which is which, for example --columns t=#1 tau=#2 q=#3."),
-    "no names and no time": (rows(",", columns=(TAU, Q)), "--columns tau=#1 q=#2 --layout period=1ms."),
-    "columns of words alone": ("1,a\nb,2\n" * 20, "say which is which, for example --layout period=1ms."),
-    "20 Hz or 20 kHz": (
-        "t,tau,q\n" + rows(",", columns=(np.arange(60_000) * 50.0, np.resize(TAU, 60_000), np.resize(Q, 60_000))),
-        '"t" steps by 50, which is 20 Hz in ms or 2e+04 Hz in us. Say which with --units t=ms.',
-    ),
-    "two torques": (
-        "time,torque_1,torque_2,pos\n" + rows(",", columns=(T, TAU, TAU, Q)),
-        "tau may be any of torque_1, torque_2; say which, for example --columns tau=torque_1.",
-    ),
-    "one name with two units": (
-        "t,tau,q [deg],q [rad]\n" + rows(",", columns=(T, TAU, Q, Q)),
-        "q may be any of q [deg], q [rad]; say which, for example --columns 'q=q [deg]'.",
-    ),
-    "one name twice": ("t,tau,q,q\n" + rows(",", columns=(T, TAU, Q, Q)), "q may be any of q (#3), q (#4)"),
-    "a current": ("time,iq,pos\n" + rows(","), 'no torque but a current, "iq". With the torque constant KT of the'),
-    "commas that part and commas in numbers": ("t,tau,q\n" + rows(",", ","), "has 3 names of columns and 6 fields in"),
-    "no time": ("tau,q\n" + rows(",", columns=(TAU, Q)), "or, if its rows are evenly spaced, say --layout period=1ms."),
-    "a row that is torn in the middle": (
-        ("t,tau,q\n" + rows(",")).replace("\n0.1,", "\n0.1\n", 1),
-        "row 101 has 1 fields where the others have 3: '0.1'.",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("why", REFUSED)
-def test_what_is_ambiguous_is_refused_with_the_option_that_decides(tmp_path: Path, why: str) -> None:
-    text, sentence = REFUSED[why]
-    with pytest.raises(RecordingError, match=re.escape(sentence)):
-        Recording.read(written(tmp_path / "run.csv", text))
-
-
-@pytest.mark.parametrize(
-    ("why", "columns", "units", "layout"),
-    [
-        ("no names", {"t": "#1", "tau": "#2", "q": "#3"}, {}, {}),
-        ("no names and no time", {"tau": "#1", "q": "#2"}, {}, {"period": "1ms"}),
-        ("two torques", {"tau": "torque_1"}, {}, {}),
-        ("one name with two units", {"q": "q [rad]"}, {}, {}),
-        ("one name twice", {"q": "#4"}, {}, {}),
-        ("a current", {"tau": "iq"}, {"tau": "1 N.m"}, {}),
-        ("no time", {}, {}, {"period": "0.001"}),
-    ],
-)
-def test_the_option_that_a_refusal_names_decides(
-    tmp_path: Path, why: str, columns: dict[str, str], units: dict[str, str], layout: dict[str, str]
-) -> None:
-    recording = Recording.read(written(tmp_path / "run.csv", REFUSED[why][0]), columns, units, layout=layout)
-    np.testing.assert_allclose(recording["tau"], TAU, atol=1e-8)
-    np.testing.assert_allclose(recording["q"], Q, atol=1e-8)
-    np.testing.assert_allclose(recording.sample_time, 1e-3, rtol=1e-9)
-
-
-def test_the_unit_of_an_ambiguous_time_can_be_stated(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", REFUSED["20 Hz or 20 kHz"][0])
-    assert Recording.read(path, units={"t": "us"}).sample_time == pytest.approx(5e-5)
-
-
-def test_seconds_stay_seconds_where_they_are_stated(tmp_path: Path) -> None:
-    text = "t [s],tau,q\n" + rows(",", columns=(T * 1e3, TAU, Q))
-    assert Recording.read(written(tmp_path / "run.csv", text)).sample_time == 1.0
-
-
-@pytest.mark.parametrize("column", ["#0", "#4", "#²", "#" + "9" * 5000])
-def test_a_number_that_no_column_has_is_named(tmp_path: Path, column: str) -> None:
-    path = written(tmp_path / "run.csv", "t,tau,q\n" + rows(","))
-    with pytest.raises(RecordingError, match=r'no column "#'):
-        Recording.read(path, columns={"q": column})
-
-
-def test_the_names_of_a_text_may_be_stated_by_their_line(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "a,b,c\nt,tau,q\nx,y,z\n" + rows(","))
-    assert Recording.read(path, layout={"header": "2"}).columns == ("t", "tau", "q")
-
-
-@pytest.mark.parametrize("header", ["-1", "9999", "²", "9" * 5000, "1e400", "two"])
-def test_what_is_no_line_of_the_text_is_refused(tmp_path: Path, header: str) -> None:
-    path = written(tmp_path / "run.csv", "t,tau,q\n" + rows(","))
-    with pytest.raises(RecordingError, match=r"^--layout header=.{1,100}: it is the line of the names, from 1 to"):
-        Recording.read(path, layout={"header": header})
-
-
-def test_a_separator_and_a_decimal_sign_can_be_stated(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", READ["semicolons and decimal commas"][0])
-    layout = {"separator": "semicolon", "decimal": "comma"}
-    np.testing.assert_allclose(Recording.read(path, layout=layout)["q"], Q, atol=1e-8)
-    with pytest.raises(RecordingError, match='"colon" is none; choices are: comma, semicolon, tab, blank, bar'):
-        Recording.read(path, layout={"separator": "colon"})
-
-
-@pytest.mark.parametrize("period", ["0", "-1ms", "soon", "1.0.0ms", "1 h"])
-def test_a_period_is_a_time(tmp_path: Path, period: str) -> None:
-    path = written(tmp_path / "run.csv", REFUSED["no time"][0])
-    with pytest.raises(RecordingError, match="it is the time between two rows, for example 1ms"):
-        Recording.read(path, layout={"period": period})
-
-
-def test_a_period_is_refused_where_rows_are_missing(tmp_path: Path) -> None:
-    text = rows(" ", columns=(TAU[:1000], Q[:1000])) + "overrun\n" + rows(" ", columns=(TAU[1000:], Q[1000:]))
-    with pytest.raises(RecordingError, match=r"needs evenly spaced rows: .*such as 'overrun'"):
-        Recording.read(written(tmp_path / "run.txt", text), {"tau": "#1", "q": "#2"}, layout={"period": "1ms"})
-
-
-@pytest.mark.parametrize(
-    ("header", "name", "unit"),
-    [
-        ("q [deg]", "q", "deg"),
-        ("q (deg)", "q", "deg"),
-        ("q (ref)", "q (ref)", ""),
-        ("tau (Nm)", "tau", "Nm"),
-        ("effort[0]", "effort[0]", ""),
-        ("x [furlong]", "x", "furlong"),
-        ("Drehzahl in 1/min", "Drehzahl", "rpm"),
-        ("speed/rad/s", "speed/rad/s", ""),
-        ("Position (Degrees)", "Position", "deg"),
-        ("v [rad/(s)]", "v", "rad/(s)"),
-        ("in s", "time", "s"),
-        ("[ms]", "time", "ms"),
-        ("X1 Lageistwert/mm", "X1 Lageistwert", "mm"),
-        ("/axis/position/rad", "/axis/position/rad", ""),
-        ("[V]", "[V]", "V"),
-    ],
-)
-def test_a_unit_is_parted_from_a_name(header: str, name: str, unit: str) -> None:
-    assert split_unit(header) == (name, unit)
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("Torque_mNm", "mNm"),
-        ("pos_deg", "deg"),
-        ("vel_rad_s", "rad/s"),
-        ("t_us", "us"),
-        ("force_kN", "kN"),
-        ("position_mm", "mm"),
-        ("q_m", ""),
-        ("load_A", ""),
-    ],
-)
-def test_a_unit_may_end_a_name(name: str, unit: str) -> None:
-    assert suffixed_unit(name) == unit
-
-
-def two_files(folder: Path) -> list[Path]:
-    one = written(folder / "run1.csv", "t,tau,q\n" + rows(","))
-    return [one, written(folder / "run3.csv", "t,load,current,q\n" + rows(",", columns=(T, Q, TAU, Q)))]
-
-
-def test_options_may_hold_for_one_file(tmp_path: Path) -> None:
-    paths = two_files(tmp_path)
-    given, units = ["run3.csv:tau=current"], [f"{paths[1]}:q=deg", "tau=mN.m"]
-    first, second = read_recordings(paths, {}, given, units, "rotary")
-    np.testing.assert_allclose([first["tau"], second["tau"]], [1e-3 * TAU, 1e-3 * TAU], atol=1e-8)
-    np.testing.assert_allclose([first["q"], second["q"]], [Q, DEG * Q], atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("given", "units", "layout", "sentence"),
-    [
-        (["run4.csv:tau=current"], [], [], '"run4.csv", which is not among: run1.csv, run3.csv. Did you mean "run'),
-        (["run3:tau=curent"], [], [], 'no column "curent" to serve as tau; it has: t, load, current, q. Did you mean'),
-        (["tau=current,q=q"], [], [], "Several go with spaces: --columns tau=current q=q."),
-        (["run3:tau=current"], ["run3:tau=A"], [], "a current becomes one with the constant of the motor"),
-        (["run3:tau=current"], ["run3:tau=V"], [], "it is a torque or force, in N.m or a unit that becomes it"),
-        ([], [], ["decimals=comma"], '"decimals" is no key; keys there are: separator, decimal, header'),
-    ],
-)  # fmt: skip
-def test_options_that_do_not_fit_are_named(
-    tmp_path: Path, given: list[str], units: list[str], layout: list[str], sentence: str
-) -> None:
-    with pytest.raises(InputError, match=re.escape(sentence)):
-        read_recordings(two_files(tmp_path), {}, given, units, "rotary", layout)
+    text, (t, tau, q), *options = READ[how]
+    path = tmp_path / "run.csv"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    recording = Recording.read(path, **(options[0] if options else {}))
+    np.testing.assert_allclose(recording.t - recording.t[0], t, atol=1e-8)
+    np.testing.assert_allclose([recording["tau"], recording["q"]], [tau, q], atol=1e-8)

@@ -10,3 +10,9 @@ def written(path: Path, header: str, *columns: Iterable[object], sep: str = ",",
     lines = [sep.join(empty if x != x else x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
     path.write_text("\n".join(([header] if header else []) + lines) + "\n", encoding="utf-8")
     return path
+
+
+def rows(*columns: Iterable[object], separator: str = ",", decimal: str = ".", end: str = "") -> str:
+    """Return the rows of a table, of numbers (nine digits) or of text, without names."""
+    cells = [[x if isinstance(x, str) else f"{x:.9g}".replace(".", decimal) for x in column] for column in columns]
+    return "".join(separator.join(row) + end + "\n" for row in zip(*cells, strict=True))
