@@ -1,11 +1,12 @@
 """What holds for every effect of the catalogue; a new one is met here by itself."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import EXAMPLES, INERTIA, LAW, NUMBERS, evaluate, mount, of_kind, slopes
+from effect_examples import EXAMPLES, INERTIA, LAW, NUMBERS, evaluate, mount, response, slopes
 from friction_laws import EXAMPLES as LAW_EXAMPLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +16,6 @@ from pyfmi_models.effects import (
     FORMS,
     ActuatorLag,
     ClockEffect,
-    Cogging,
     Coupling,
     Delay,
     DriveEffect,
@@ -32,7 +32,17 @@ from pyfmi_models.friction import Frictionless, LuGre
 from pyfmi_models.model import Model, parameters_of
 
 LUGRE = LuGre(sigma0=1e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.02)
-EACH = pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+
+
+def each(chosen: Sequence[Effect]) -> Any:
+    return pytest.mark.parametrize("effect", chosen, ids=lambda one: type(one).__name__)
+
+
+def of_kind(*kinds: type[Effect]) -> list[Any]:
+    return [one for one in EXAMPLES if isinstance(one, kinds)]
+
+
+EACH = each(EXAMPLES)
 WEIGHT = GravityUnbalance(mgl=2.0)
 """On the axis everywhere, so that what depends on a load has one."""
 MULTIPLIED = ("friction_asymmetry", "stribeck", "position_friction", "thermal_viscosity")
@@ -117,7 +127,7 @@ def test_every_form_is_in_the_catalogue_and_has_an_example() -> None:
 momentary = [one for one in of_kind(FrictionEffect) if one.id != "presliding"]
 
 
-@pytest.mark.parametrize("effect", momentary, ids=lambda one: type(one).__name__)
+@each(momentary)
 @settings(max_examples=30, deadline=None)
 @given(q=st.floats(-4, 4), v=st.floats(-2, 2), age=st.floats(0, 1e3), degrees=st.floats(-20, 60))
 def test_friction_never_drives(effect: FrictionEffect, q: float, v: float, age: float, degrees: float) -> None:
@@ -135,7 +145,7 @@ loads_of_the_moment = [one for one in of_kind(LoadEffect) if not one.states()]
 """Those with a memory are asked over time, in the tests of their own."""
 
 
-@pytest.mark.parametrize("effect", loads_of_the_moment, ids=lambda one: type(one).__name__)
+@each(loads_of_the_moment)
 def test_a_load_resists_and_is_the_same_for_the_equation_of_motion(effect: LoadEffect) -> None:
     model, plain = mount(effect).model(), mount().model()
     given = {one.name: one.nominal for one in effect.inputs()}
@@ -147,7 +157,7 @@ def test_a_load_resists_and_is_the_same_for_the_equation_of_motion(effect: LoadE
         assert (there - here) * INERTIA == pytest.approx(load, rel=1e-9)
 
 
-@pytest.mark.parametrize("effect", loads_of_the_moment, ids=lambda one: type(one).__name__)
+@each(loads_of_the_moment)
 def test_a_load_gives_back_over_a_round_trip_what_it_took_or_less(effect: LoadEffect) -> None:
     """Work over a closed path at one moment: zero for a potential, positive for what wastes, never negative."""
     turn = np.linspace(0, 2 * np.pi, 2001)
@@ -160,7 +170,7 @@ def test_a_load_gives_back_over_a_round_trip_what_it_took_or_less(effect: LoadEf
     assert work > 0.1 or effect.id != "quadratic_drag"
 
 
-@pytest.mark.parametrize("effect", of_kind(SensorEffect), ids=lambda one: type(one).__name__)
+@each(of_kind(SensorEffect))
 def test_a_sensor_effect_changes_what_is_read_and_nothing_else(effect: SensorEffect) -> None:
     model, plain = mount(effect).model(), mount().model()
     here, there = (evaluate(one, position=0.4, speed=0.2, tau=3.0) for one in (model, plain))
@@ -169,7 +179,7 @@ def test_a_sensor_effect_changes_what_is_read_and_nothing_else(effect: SensorEff
     assert here["der(speed)"] == there["der(speed)"]
 
 
-@pytest.mark.parametrize("effect", of_kind(Coupling, InertiaEffect), ids=lambda one: type(one).__name__)
+@each(of_kind(Coupling, InertiaEffect))
 def test_at_rest_a_torque_accelerates_no_less_than_a_rigid_axis_would_be(effect: Effect) -> None:
     """What is behind a coupling is not felt at once, and what is in front is never more than all."""
     rates = evaluate(mount(effect, friction=Frictionless()).model(), position=-0.2, tau=3.0)
@@ -206,30 +216,17 @@ def test_an_effect_acts_in_one_place_and_says_what_it_is_and_what_tells_it_from_
 multipliers = [one for one in of_kind(FrictionEffect) if one.id in MULTIPLIED and not one.states()]
 
 
-@pytest.mark.parametrize("effect", multipliers, ids=lambda one: type(one).__name__)
+@each(multipliers)
 def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect) -> None:
     warm = mount(effect).at(0.0, 1.0, 0.1, {"temperature": 35.0})
     assert isinstance(effect, StribeckEffect) or float(effect.level(0.0, warm)) == pytest.approx(0, abs=1e-12)
     assert float(effect.viscous(0.0, warm)) == pytest.approx(0, abs=1e-12)
 
 
-def test_cycles_of_a_linear_axis_are_per_metre() -> None:
-    model = mount(Cogging(cycles_per_rev=4, amplitude=1.0), motion="linear").model()
-    for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
-        assert evaluate(model, position=q)["der(speed)"] == pytest.approx(-load / INERTIA, abs=1e-12)
-
-
 @pytest.mark.parametrize("omega", [1.0, 40.0])
 def test_the_plant_sends_the_command_through_its_drive_effects_in_series(omega: float) -> None:
     """States of a dead time follow it within its band; there the response is the product of both."""
     drives = (Delay(delay_ms=4.0), ActuatorLag(time_constant_ms=3.0))
-    model = mount(*drives, friction=Frictionless()).model()
-    values = [parameter.start for parameter in model.parameters]
-    x, u = ca.SX.sym("x", len(model.states)), ca.SX.sym("u", 2)
-    rates, outputs = model.equations(0, x, u, values)
-    applied = outputs[[one.name for one in model.outputs].index("applied")]
-    slopes = [ca.jacobian(part, of) for part in (rates[2:], applied) for of in (x[2:], u[0])]
-    A, B, C, D = (part.full() for part in ca.Function("slopes", [x, u], slopes)(0, 0))
-    found = (C @ np.linalg.solve(1j * omega * np.eye(len(A)) - A, B) + D).item()
+    found = response(mount(*drives, friction=Frictionless()).model(), omega / (2 * np.pi), "applied")
     expected = np.prod([one.response(np.array([omega])) for one in drives])
     assert abs(found - expected) < 1e-5 * abs(expected)

@@ -10,11 +10,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import example
+from effect_examples import FORM, example
 
-from pyfmi_models.effects import FORMS, Effect, Motion
+from pyfmi_models.effects import Effect, Motion
 
-FORM = {form.__name__: form for form in FORMS}
 Rows = list[float]
 
 
@@ -219,32 +218,18 @@ def near(found: Any, expected: Any, rtol: float = 1e-7) -> None:
     np.testing.assert_allclose(ca.DM(found).full().ravel(), np.ravel(expected), rtol=rtol, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("method", "name"),
-    [
-        *(("level", name) for name in LEVELS),
-        *(("viscous", name) for name in VISCOUS),
-        *(("inertia", name) for name in INERTIAS),
-        *(("reading", name) for name in READINGS),
-    ],
-)
-def test_what_an_effect_makes_of_a_value_is_its_equation(method: str, name: str) -> None:
-    expected = {"level": LEVELS, "viscous": VISCOUS, "inertia": INERTIAS, "reading": READINGS}[method][name]
-    effect = example(FORM[name])
-    for motion in motions(effect, 1):
-        near(getattr(effect, method)(1.7, motion), expected(effect, motion, 1.7))
+OF_A_VALUE = {"level": LEVELS, "viscous": VISCOUS, "inertia": INERTIAS, "reading": READINGS}
+OF_A_MOTION: dict[str, Any] = {"load": LOADS, "ahead": AHEAD, "rate": RATES}
+ASKED = [(method, name) for method, forms in (OF_A_VALUE | OF_A_MOTION).items() for name in forms]
 
 
-@pytest.mark.parametrize(
-    ("method", "name"),
-    [*(("load", name) for name in LOADS), *(("ahead", name) for name in AHEAD), *(("rate", name) for name in RATES)],
-)
+@pytest.mark.parametrize(("method", "name"), ASKED)
 def test_what_an_effect_makes_of_a_motion_is_its_equation(method: str, name: str) -> None:
-    expected = {"load": LOADS, "ahead": AHEAD, "rate": RATES}[method][name]  # type: ignore[index]
-    effect = example(FORM[name])
+    expected, effect = (OF_A_VALUE | OF_A_MOTION)[method][name], example(FORM[name])
+    value = (1.7,) if method in OF_A_VALUE else ()
     for motion in motions(effect, 2):
         rtol = 2e-6 if name == "Cogging" else 1e-7  # its half is the highest of 3072 points, not of all
-        near(getattr(effect, method)(motion), expected(effect, motion), rtol)
+        near(getattr(effect, method)(*value, motion), expected(effect, motion, *value), rtol)
 
 
 @pytest.mark.parametrize("name", APPLIED)
@@ -262,29 +247,25 @@ def test_the_response_of_a_drive_is_that_of_its_equation(name: str) -> None:
     np.testing.assert_allclose(example(FORM[name]).response(omega), [RESPONSES[name](w) for w in omega], rtol=1e-12)
 
 
-@pytest.mark.parametrize("degrees", [-40.0, 20.0, 60.0, 700.0])
-def test_a_warm_drive_gives_its_share_and_never_less_than_a_tenth(degrees: float) -> None:
-    effect = example(FORM["WarmTorqueDroop"])
-    given = effect.given(Motion(0.0, 0.0, 0.0, 0.0, {"temperature": degrees})).applied((), 6.0)
-    near(given, drooped(effect, 6.0) * max(0.1, 1 - 0.002 * (degrees - 20)))
+def warm(e: Any, m: Motion) -> float:
+    return drooped(e, 6.0) * max(0.1, 1 - 0.002 * (m.inputs["temperature"] - 20))
 
 
-@pytest.mark.parametrize("q", [-3.0, -0.4, 0.6, 1.3])
-def test_a_learned_torque_constant_is_the_exponential_of_its_table(q: float) -> None:
-    effect = example(FORM["LearnedGain"])
-    told = table(effect, list(effect.more_command), -1, 1.2, q)
-    near(effect.given(Motion(0.0, q, 0.0, q)).applied((), 6.0), 6 * math.exp(-told))
+GIVEN: dict[str, Callable[[Any, Motion], float]] = {
+    "WarmTorqueDroop": warm,
+    "LearnedGain": lambda e, m: 6 * math.exp(-table(e, list(e.more_command), -1, 1.2, m.q)),
+}
+
+
+@pytest.mark.parametrize("name", GIVEN)
+@pytest.mark.parametrize(("q", "degrees"), [(-3.0, -40.0), (-0.4, 20.0), (0.6, 60.0), (1.3, 700.0)])
+def test_a_drive_that_goes_with_the_motion_is_its_equation(name: str, q: float, degrees: float) -> None:
+    """A warm drive gives never less than a tenth."""
+    effect, motion = example(FORM[name]), Motion(0.0, q, 0.0, q, {"temperature": degrees})
+    near(effect.given(motion).applied((), 6.0), GIVEN[name](effect, motion))
 
 
 def test_every_form_with_an_equation_of_its_own_is_asked_here() -> None:
-    asked = {*LEVELS, *VISCOUS, *LOADS, *INERTIAS, *READINGS, *AHEAD, *RATES, *APPLIED, *RESPONSES}
-    others = {
-        "WarmTorqueDroop",
-        "LearnedGain",
-        "Compliance",
-        "LoadSideCompliance",
-        "Backlash",
-        "FrictionWander",
-        "Presliding",
-    }
-    assert set(FORM) == asked | others, "Presliding: in test_effects_masses.py"
+    asked = {*(name for _, name in ASKED), *APPLIED, *RESPONSES, *GIVEN}
+    others = {"Compliance", "LoadSideCompliance", "Backlash", "FrictionWander", "Presliding"}
+    assert set(FORM) == asked | others, "those in test_effects_masses.py"

@@ -8,22 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_examples import INERTIA, evaluate, example, mount
-from test_effects_equations import FORM, near, sign
+from effect_examples import FORM, INERTIA, evaluate, example, mount
+from test_effects_equations import near, sign
 
-from pyfmi_models.effects import (
-    Cogging,
-    FrictionAsymmetry,
-    FrictionEffect,
-    FrictionWander,
-    GravityUnbalance,
-    StribeckEffect,
-)
-from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction
-from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
+from pyfmi_models.effects import Cogging, FrictionAsymmetry, FrictionEffect, FrictionWander, GravityUnbalance
 from pyfmi_models.friction import Coulomb, LuGre
+from pyfmi_models.mount import Axis
 
 
 def test_a_spring_between_two_masses_is_its_equation_in_time_and_over_frequency() -> None:
@@ -53,7 +43,7 @@ def test_a_spring_before_the_axis_is_its_equation_in_time_and_over_frequency() -
     np.testing.assert_allclose(spring.demand(omega), expected, rtol=1e-12)
 
 
-PLAY = Backlash(gap_rad=0.01, load_friction=0.3, load_viscous=0.7, load_deflection=1e-3, contact_hz=30.0)
+PLAY = FORM["Backlash"](gap_rad=0.01, load_friction=0.3, load_viscous=0.7, load_deflection=1e-3, contact_hz=30.0)
 
 
 @pytest.mark.parametrize(("twist", "rate"), [(0.004, 1.0), (0.006, 0.0), (0.006, 0.5), (0.006, -9.0), (-0.0051, -0.4)])
@@ -129,20 +119,23 @@ def torque(*effects: FrictionEffect, q: float = 0.0, v: float = 0.2, **values: f
 
 
 def test_friction_effects_add_up_in_their_order() -> None:
-    both = (StribeckEffect(Fs=4.0, Vs=1e3), FrictionAsymmetry(level_asymmetry=0.1))
+    both = (FORM["StribeckEffect"](Fs=4.0, Vs=1e3), FrictionAsymmetry(level_asymmetry=0.1))
     assert torque(*both, v=0.1) == pytest.approx(4.0 * 1.1 + 0.3, rel=1e-6)
     assert torque(*reversed(both), v=0.1) == pytest.approx(4.0 + 0.3, rel=1e-6)
 
 
 def test_the_temperature_is_an_input_that_starts_at_20_degrees_and_is_shared() -> None:
-    two = (ThermalViscosity(viscous_per_degC=-0.04), WarmingViscosity(viscous_per_degC=0.01, warm_up_degC=5.0))
+    two = (
+        FORM["ThermalViscosity"](viscous_per_degC=-0.04),
+        FORM["WarmingViscosity"](viscous_per_degC=0.01, warm_up_degC=5.0),
+    )
     inputs = mount(*two).model().inputs
     assert [(one.name, one.unit, one.start) for one in inputs[2:]] == [("temperature", "degC", 20.0)]
     assert len(mount().model().inputs) == 2
 
 
 def test_friction_grows_with_the_weights_on_the_axis_and_with_nothing_else() -> None:
-    effect, weight = LoadDependentFriction(coulomb_per_Nm=0.2), GravityUnbalance(mgl=5.0, phase=0.1)
+    effect, weight = FORM["LoadDependentFriction"](coulomb_per_Nm=0.2), GravityUnbalance(mgl=5.0, phase=0.1)
     for q in (-1.0, 0.0, 1.4):
         assert torque(effect, weight, q=q) == pytest.approx(1.6 + 0.2 * 5 * abs(np.sin(q + 0.1)))
     assert torque(effect, Cogging(cycles_per_rev=4, amplitude=9.0), disturbance=7.0) == pytest.approx(1.6)
@@ -153,7 +146,7 @@ def test_friction_grows_with_the_weights_on_the_axis_and_with_nothing_else() -> 
 @pytest.mark.parametrize(("inertia", "others"), [(1.0, 0.0), (0.4, 0.0), (1.0, 1.0), (0.7, 0.4)])
 def test_friction_of_a_gear_grows_with_all_that_goes_through_its_teeth(inertia: float, others: float) -> None:
     """Whatever the torque: lifting, lowering, driving and braking, the axis accelerates as the friction then says."""
-    effect = GearLoadFriction(coulomb_per_Nm=0.2, at_level=1.0, inertia_share=inertia, friction_share=others)
+    effect = FORM["GearLoadFriction"](coulomb_per_Nm=0.2, at_level=1.0, inertia_share=inertia, friction_share=others)
     effects = (GravityUnbalance(mgl=5.0, phase=0.1), Cogging(cycles_per_rev=4, amplitude=0.8), effect)
     for q, v, tau in product((-1.0, 1.4), (-0.5, 0.2), (-20.0, -4.0, 0.0, 3.0, 15.0)):
         found = evaluate(mount(*effects).model(), position=q, speed=v, tau=tau)
@@ -164,7 +157,7 @@ def test_friction_of_a_gear_grows_with_all_that_goes_through_its_teeth(inertia: 
 
 
 def test_a_static_law_with_presliding_is_lugre() -> None:
-    effect, law = Presliding(sigma0=2e4, sigma1=90.0), Coulomb(Fc=1.0, sigma2=3.0)
+    effect, law = FORM["Presliding"](sigma0=2e4, sigma1=90.0), Coulomb(Fc=1.0, sigma2=3.0)
     bent = mount(effect, friction=law).model()
     lugre = mount(friction=LuGre(sigma0=2e4, sigma1=90.0, sigma2=3.0, Fc=1.0)).model()
     assert [s.name for s in bent.states] == [s.name for s in lugre.states]
@@ -175,9 +168,44 @@ def test_a_static_law_with_presliding_is_lugre() -> None:
 
 def test_presliding_replaces_the_bristles_of_a_law_that_has_its_own() -> None:
     law = LuGre(sigma0=1e6, sigma1=0.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.1)
-    model = mount(Presliding(sigma0=2e4), friction=law).model()
+    model = mount(FORM["Presliding"](sigma0=2e4), friction=law).model()
     found = evaluate(model, speed=1e-6, **{"friction.bristle": 0.0})
     assert found["der(friction.bristle)"] == pytest.approx(2e4 * 1e-6)
     assert [s.name for s in model.states] == ["position", "speed", "friction.bristle"]
     sliding = evaluate(model, speed=0.05, **{"friction.bristle": float(law.level(0.05))})
     assert sliding["der(friction.bristle)"] == pytest.approx(0, abs=1e-9)  # its level is still the law's
+
+
+# What effects of a mount do together, and where each acts.
+
+
+@pytest.mark.parametrize("load", [-4.0, 4.0])
+def test_a_gear_of_a_linear_axis_feels_a_known_load(load: float) -> None:
+    effects = (FORM["KnownLoad"](), FORM["GearFriction"](driving=0.6, driven=0.2))
+    for v in (-0.2, 0.2):
+        found = evaluate(mount(*effects, motion="linear").model(), position=0.7, speed=v, load_torque=load)["friction"]
+        level = 1.0 + (0.6 if load * v > 0 else 0.2) * 4.0
+        assert found == pytest.approx(level * np.sign(v) + 3 * v, rel=1e-12)
+
+
+def test_the_torque_limit_acts_before_the_knee() -> None:
+    knee = FORM["TorqueSaturation"](knee_torque=5.0, slope=0.4)
+    model = mount(knee, axis=Axis(inertia=INERTIA, torque_limit=6.0)).model()
+    assert evaluate(model, tau=100.0)["applied"] == pytest.approx(5.4, abs=1e-4)
+
+
+DISC = FORM["EncoderEccentricity"](cycles_per_rev=8, amplitude_rad=1e-3, phase=0.3, second=0.2)
+
+
+def test_cycles_of_a_linear_axis_are_per_metre() -> None:
+    model = mount(Cogging(cycles_per_rev=4, amplitude=1.0), DISC, motion="linear").model()
+    for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
+        found = evaluate(model, position=q)
+        assert found["der(speed)"] == pytest.approx(-load / INERTIA, abs=1e-12)
+        assert found["q"] - q == pytest.approx(1e-3 * (np.sin(0.3) + 0.2 * np.sin(0.6)), abs=1e-15)
+
+
+def test_errors_of_several_encoders_add_up() -> None:
+    other = FORM["EncoderEccentricity"](cycles_per_rev=1, amplitude_rad=2e-3)
+    one, two = 1e-3 * (np.sin(1.9) + 0.2 * np.sin(3.8)), 2e-3 * np.sin(0.2)
+    assert evaluate(mount(DISC, other).model(), position=0.2)["q"] - 0.2 == pytest.approx(one + two)

@@ -3,13 +3,11 @@
 from math import log
 
 import pytest
-from effect_examples import EXAMPLES, example
+from effect_examples import EXAMPLES, FORM, example
 
 from cosim.diagnosis.measure.findings import between
-from pyfmi_models.effects import FORMS
 from pyfmi_models.effects.shares import higher, percent
 
-BY_NAME = {form.__name__: form for form in FORMS}
 TURNING = {
     "ActuatorLag": "The drive builds up its torque slowly, with a time constant of 4 ms.",
     "AltitudeInertia": "The azimuth carries 3 kg·m² more with the tube level than at the zenith.",
@@ -48,13 +46,11 @@ TURNING = {
     "WarmingViscosity": "Viscous friction falls by 45 % in the first 90 s.",
     "RubbedViscosity": "Viscous friction falls by 32 % per rad rubbed.",
     "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of small ones less.",
-    "WarmTorqueDroop": (
-        "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % less per degree."
-    ),
+    "WarmTorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of small ones less, "
+    "and gives 0.2 % less per degree.",
     "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",
-    "ConstantForce": (
-        "A constant load of 0.7 N·m pushes the axis backward: a weight, or an offset of the drive's reading."
-    ),
+    "ConstantForce": "A constant load of 0.7 N·m pushes the axis backward: "
+    "a weight, or an offset of the drive's reading.",
     "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
 }
 """By the examples of tests/tools/effect_examples.py; 36 % is 1 - (20 / 25)^2, the share that rings."""
@@ -75,7 +71,7 @@ SLIDING = {
 
 @pytest.mark.parametrize("name", TURNING)
 def test_a_sentence_says_the_numbers_of_an_axis_that_turns_and_of_one_that_slides(name: str) -> None:
-    effect, sliding = example(BY_NAME[name]), TURNING[name]
+    effect, sliding = example(FORM[name]), TURNING[name]
     assert effect.statement() == TURNING[name]
     for one, other in SLIDING.items():
         sliding = sliding.replace(one, other)
@@ -93,12 +89,7 @@ def test_a_sentence_says_the_numbers_of_an_axis_that_turns_and_of_one_that_slide
         (
             "WarmTorqueDroop",
             {"droop": 0.2, "rated_torque": 8.0, "per_degC": 0.002},
-            "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % more per degree.",
-        ),
-        (
-            "ThermalViscosity",
-            {"viscous_per_degC": 0.0, "coulomb_per_degC": -0.02},
-            "Sliding friction falls by 2 % per degree.",
+            TURNING["WarmTorqueDroop"].replace("less per", "more per"),
         ),
         ("ThermalViscosity", {"viscous_per_degC": 0.0}, "Friction keeps its size."),
         (
@@ -106,20 +97,11 @@ def test_a_sentence_says_the_numbers_of_an_axis_that_turns_and_of_one_that_slide
             {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02, "warm_up_degC": 10.0, "warm_up_s": 60.0},
             "Viscous friction grows by 11 % in the first 3 min and sliding friction falls by 18 % in the first 3 min.",
         ),
-        (
-            "ThermalViscosity",
-            {"viscous_per_degC": 0.04},
-            "Viscous friction grows by 4 % per degree.",
-        ),
+        ("ThermalViscosity", {"viscous_per_degC": 0.04}, "Viscous friction grows by 4 % per degree."),
         (
             "ConcaveViscous",
             {"thinning_speed": 0.3, "exponent": 0.4},
             "Above 0.3 rad/s viscous friction rises less than the speed: the grease thins.",
-        ),
-        (
-            "FrictionAsymmetry",
-            {"level_asymmetry": 0.1},
-            "Sliding friction differs by 20 % between directions (of the mean; higher forward).",
         ),
         (
             "FrictionAsymmetry",
@@ -149,7 +131,7 @@ def test_a_sentence_says_the_numbers_of_an_axis_that_turns_and_of_one_that_slide
 def test_a_sentence_says_signs_and_leaves_out_what_is_not_there(
     name: str, numbers: dict[str, float], expected: str
 ) -> None:
-    assert BY_NAME[name](**numbers).statement() == expected
+    assert FORM[name](**numbers).statement() == expected
 
 
 def test_what_was_learned_says_over_what_and_how_large_it_is() -> None:

@@ -10,38 +10,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import mount
+from effect_examples import FORM, mount
 
 from cosim_studies.proof import truth
 from cosim_studies.proof.families import periodic_disturbance
 from cosim_studies.proof.recorder import columns_of
 from cosim_studies.proof.simulated_axis import draw_axis
 from cosim_studies.proof.truth import BLOCKS, TICK, Drive
-from pyfmi_models.effects import (
-    ActuatorLag,
-    Cogging,
-    Delay,
-    Effect,
-    FrictionAsymmetry,
-    GravityUnbalance,
-    LocalFriction,
-    PeriodicFriction,
-    StribeckEffect,
-    TorqueOffset,
-)
-from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.cable_wrap import CableWrap
-from pyfmi_models.effects.clock_skew import ClockSkew
-from pyfmi_models.effects.compliance import Compliance
-from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
-from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
-from pyfmi_models.effects.inertia_variation import InertiaVariation
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
-from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.effects.quadratic_drag import QuadraticDrag
-from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
-from pyfmi_models.effects.torque_saturation import TorqueSaturation
+from pyfmi_models.effects import Cogging, Effect, GravityUnbalance
 from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.model import Model
 
@@ -55,12 +31,12 @@ QUARTER = np.pi / 2
 """The generator writes sines where cogging and periodic friction are cosines here."""
 
 
-def cogging() -> tuple[Cogging, dict[str, float]]:
+def cogging() -> tuple[tuple[Effect, ...], dict[str, float]]:
     x = np.linspace(0, 2 * np.pi, 100_001)
     half = float(np.ptp(np.sin(x) + 0.4 * np.sin(2 * x) - 0.2 * np.sin(3 * x))) / 2
     ours = Cogging(cycles_per_rev=20, amplitude=1.5 * half, phase=0.7 - QUARTER, harmonics=(0.4, -0.2))
     parts = {"cogging_1": 1.5, "cogging_2": 0.6, "cogging_3": -0.3}
-    return ours, parts | {"cogging_cycles": 20.0, "cogging_phase": 0.7}
+    return (ours,), parts | {"cogging_cycles": 20.0, "cogging_phase": 0.7}
 
 
 def two_masses(share: float, hertz: float, ratio: float) -> dict[str, float]:
@@ -69,60 +45,64 @@ def two_masses(share: float, hertz: float, ratio: float) -> dict[str, float]:
     return parts | {"drive_damping": 2 * ratio * omega * far}
 
 
+def one(form: str, **numbers: float) -> tuple[Effect, ...]:
+    return (FORM[form](**numbers),)
+
+
 WEIGHT = GravityUnbalance(mgl=3.0, phase=0.4)
 CASES: dict[str, tuple[tuple[Effect, ...], dict[str, float]]] = {
     "friction_asymmetry": (
-        (FrictionAsymmetry(level_asymmetry=0.2, viscous_asymmetry=-0.3),),
+        one("FrictionAsymmetry", level_asymmetry=0.2, viscous_asymmetry=-0.3),
         {"level_asymmetry": 0.2, "viscous_asymmetry": -0.3},
     ),
-    "stribeck": ((StribeckEffect(Fs=3.5, Vs=0.5),), {"breakaway": 3.5, "stribeck_speed": 0.5}),
-    "cogging": ((cogging()[0],), cogging()[1]),
+    "stribeck": (one("StribeckEffect", Fs=3.5, Vs=0.5), {"breakaway": 3.5, "stribeck_speed": 0.5}),
+    "cogging": cogging(),
     "position_friction, periodic": (
-        (PeriodicFriction(cycles_per_rev=9, relative_amplitude=0.4, phase=0.3 - QUARTER),),
+        one("PeriodicFriction", cycles_per_rev=9, relative_amplitude=0.4, phase=0.3 - QUARTER),
         {"rough_relative": 0.4, "rough_cycles": 9, "rough_phase": 0.3},
     ),
     "position_friction, local": (
-        (LocalFriction(q_center=0.15, width=0.04, relative_amplitude=0.8),),
+        one("LocalFriction", q_center=0.15, width=0.04, relative_amplitude=0.8),
         {"spot_relative": 0.8, "spot_center": 0.15, "spot_width": 0.04},
     ),
     "gravity_unbalance": ((WEIGHT,), {"unbalance": 3.0, "unbalance_phase": 0.4}),
-    "torque_offset": ((TorqueOffset(torque=-0.8),), {"offset": -0.8}),
+    "torque_offset": (one("TorqueOffset", torque=-0.8), {"offset": -0.8}),
     "thermal_viscosity": (
-        (ThermalViscosity(viscous_per_degC=-0.04, coulomb_per_degC=-0.02),),
+        one("ThermalViscosity", viscous_per_degC=-0.04, coulomb_per_degC=-0.02),
         {"thermal_viscous": -0.04, "thermal_level": -0.02},
     ),
     "dwell_breakaway": (
-        (DwellBreakaway(torque_per_efold=0.8, onset_s=0.02, memory_rad=2e-2),),
+        one("DwellBreakaway", torque_per_efold=0.8, onset_s=0.02, memory_rad=2e-2),
         {"dwell_torque": 0.8, "dwell_time": 0.02, "dwell_length": 2e-2},
     ),
     "compliance": (
-        (Compliance(antiresonance_hz=8.0, resonance_hz=8.0 / np.sqrt(0.6), damping_ratio=0.03),),
+        one("Compliance", antiresonance_hz=8.0, resonance_hz=8.0 / np.sqrt(0.6), damping_ratio=0.03),
         two_masses(0.4, 8.0, 0.03),
     ),
-    "actuator_lag": ((ActuatorLag(time_constant_ms=6.0),), {"lag": 6e-3}),
-    "delay": ((Delay(delay_ms=6.0),), {"delay": 6e-3}),
+    "actuator_lag": (one("ActuatorLag", time_constant_ms=6.0), {"lag": 6e-3}),
+    "delay": (one("Delay", delay_ms=6.0), {"delay": 6e-3}),
     "backlash": (
-        (Backlash(gap_rad=0.02, load_share=0.5, contact_hz=30.0),),
+        one("Backlash", gap_rad=0.02, load_share=0.5, contact_hz=30.0),
         two_masses(0.5, 30.0, 0.75) | {"gap": 0.02},
     ),
     "encoder_eccentricity": (
-        (EncoderEccentricity(cycles_per_rev=8, amplitude_rad=2e-3, phase=0.5, second=0.3),),
+        one("EncoderEccentricity", cycles_per_rev=8, amplitude_rad=2e-3, phase=0.5, second=0.3),
         {"ripple_1": 2e-3, "ripple_2": 6e-4, "ripple_cycles": 8, "ripple_phase": 0.5},
     ),
-    "quadratic_drag": ((QuadraticDrag(coefficient=2.0),), {"quadratic": 2.0}),
+    "quadratic_drag": (one("QuadraticDrag", coefficient=2.0), {"quadratic": 2.0}),
     "cable_wrap": (
-        (CableWrap(stiffness=6.0, home=0.1, hardening=2.0),),
+        one("CableWrap", stiffness=6.0, home=0.1, hardening=2.0),
         {"cable": 6.0, "cable_home": 0.1, "cable_hardening": 2.0},
     ),
     "inertia_variation": (
-        (InertiaVariation(relative_amplitude=0.4, cycles_per_rev=3, phase=0.6),),
+        one("InertiaVariation", relative_amplitude=0.4, cycles_per_rev=3, phase=0.6),
         {"inertia_swing": 0.4, "inertia_cycles": 3, "inertia_phase": 0.6},
     ),
     "load_dependent_friction": (
-        (WEIGHT, LoadDependentFriction(coulomb_per_Nm=0.3)),
+        (WEIGHT, *one("LoadDependentFriction", coulomb_per_Nm=0.3)),
         {"payload": 3.0, "payload_phase": 0.4, "load_sensitivity": 0.3},
     ),
-    "torque_saturation": ((TorqueSaturation(knee_torque=8.0, slope=0.4),), {"knee": 8.0, "knee_slope": 0.4}),
+    "torque_saturation": (one("TorqueSaturation", knee_torque=8.0, slope=0.4), {"knee": 8.0, "knee_slope": 0.4}),
 }
 """Effects of the plant, and what conceals the same in the truth."""
 LEFT = 0.01
@@ -180,7 +160,7 @@ def test_a_periodic_disturbance_has_its_frequency_amplitude_and_phase() -> None:
     before = {name: drive.push for name, drive in bench.drives.items()}
     true = periodic_disturbance(bench, np.random.default_rng(1), 1.0)
     for name, phase in true["phases"].items():
-        ours = PeriodicDisturbance(frequency_hz=true["frequency_hz"], amplitude=true["amplitude"], phase=phase)
+        ours = FORM["PeriodicDisturbance"](frequency_hz=true["frequency_hz"], amplitude=true["amplitude"], phase=phase)
         t = truth.ticks(before[name].size)
         load = np.asarray(ours.load(mount().at(ca.DM(t), 0.0, 0.0))).ravel()
         np.testing.assert_allclose(load, bench.drives[name].push - before[name], atol=1e-9 * true["amplitude"])
@@ -193,7 +173,7 @@ def test_a_positive_offset_of_the_clocks_means_a_reading_ahead_of_the_torque() -
     t = truth.ticks(20_000)
     raw = {"command": 0 * t, "reading": t, "clean_reading": t, "temperature": 0 * t}  # reads its own time
     table = columns_of(bench, "train_1", raw, 1000, np.random.default_rng(0))
-    ours = ClockSkew(offset_ms=5.0, drift_ppm=500.0)
+    ours = FORM["ClockSkew"](offset_ms=5.0, drift_ppm=500.0)
     expected = [float(ours.ahead(mount().at(time, 0.0, 0.0))) for time in table.t[:1000]]
     np.testing.assert_allclose((table.q - table.t)[:1000], expected, atol=bench.noise["quantum"])
 
@@ -201,5 +181,5 @@ def test_a_positive_offset_of_the_clocks_means_a_reading_ahead_of_the_torque() -
 def test_a_contact_that_bends_is_the_same_in_both() -> None:
     made = concealed({})
     static = Coulomb(Fc=2.0, sigma2=5.0)
-    bent = replayed(mount(Presliding(sigma0=3e4, sigma1=200.0), friction=static).model(), made["command"])
+    bent = replayed(mount(FORM["Presliding"](sigma0=3e4, sigma1=200.0), friction=static).model(), made["command"])
     assert np.abs(bent["q"] - made["angle"]).max() < 2e-5

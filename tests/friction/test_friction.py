@@ -22,6 +22,7 @@ from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, WarmingVisco
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.export import export_fmu
 from pyfmi_models.friction import Coulomb, Dahl, FrictionLaw, Frictionless, LuGre, MaxwellSlip, Stribeck
+from pyfmi_models.friction.dahl import _log1p_ratio
 from pyfmi_models.friction.lugre_passive import PassiveLuGre
 from pyfmi_models.model import Model, Pair, Recorded, Variable, parameters_of, symbols_of, with_symbols
 from pyfmi_models.mount import Axis, Mount
@@ -107,6 +108,12 @@ def test_elements_of_maxwell_slip_are_stiff_in_a_row_and_each_follows_its_part_o
     assert MaxwellSlip.elements == 8
     assert [one.name for one in law.states()] == [f"element_{k}" for k in range(1, 9)]
     assert {one.nominal for one in law.states()} == {0.1}
+
+
+@pytest.mark.parametrize("x", [-0.9, -1.01e-4, -0.99e-4, 1e-9, 0.99e-4, 1.01e-4, 40.0])
+def test_the_logarithm_of_a_brittle_contact_is_smooth_through_zero(x: float) -> None:
+    assert float(_log1p_ratio(x)) == pytest.approx(math.log1p(x) / x, rel=1e-14)
+    assert float(_log1p_ratio(0.0)) == 1.0
 
 
 @pytest.mark.parametrize(("share", "passive"), [(1.001, True), (0.999, False)])

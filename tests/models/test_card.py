@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from effect_examples import EXAMPLES
+from effect_examples import EXAMPLES, FORM
 
 from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
 from pyfmi_models.card_writer import card_text
-from pyfmi_models.effects import Cogging, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
-from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
+from pyfmi_models.effects import Cogging, GravityUnbalance, LocalFriction, PeriodicFriction
 from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.model import Pair
 
@@ -94,9 +93,8 @@ def full() -> Card:
 def test_a_card_says_what_was_written() -> None:
     card = full()
     assert card.mount.name == 'north "axis" 3°'
-    assert card.friction == LuGre(
-        sigma0=Pair(9.85e4, 8.61e4), sigma1=497.0, Fc=Pair(2.1, 2.4), Fs=3.3, Vs=0.04, delta=1.292
-    )
+    curve = {"Fc": Pair(2.1, 2.4), "Fs": 3.3, "Vs": 0.04, "delta": 1.292}
+    assert card.friction == LuGre(sigma0=Pair(9.85e4, 8.61e4), sigma1=497.0, **curve)
     assert card.unbalance == GravityUnbalance(mgl=1.5, phase=-0.2)
     assert card.effects == (
         Cogging(cycles_per_rev=24, amplitude=0.5),
@@ -106,6 +104,8 @@ def test_a_card_says_what_was_written() -> None:
     assert card.controller is not None
     assert (card.controller.compensation, card.controller.loop_hz) == ("C3a", 10_000)
     assert card.believed == LuGre(sigma0=9e4, Fc=Pair(2.0, 2.5))
+    order = [effect.id for effect in card.plant().effects]
+    assert order == ["gravity_unbalance", "cogging", "position_friction", "position_friction"], "the known load first"
     assert card.columns == {"tau": "force", "motor temperature": "T_m"}
 
 
@@ -132,25 +132,18 @@ def test_all_effects_together_can_be_written_and_read_and_make_a_plant() -> None
 
 
 @pytest.mark.parametrize(
-    ("numbers", "form"),
+    ("effect", "numbers", "form"),
     [
-        ("", ThermalViscosity),
-        ("warm_up_degC = 9.0\n", WarmingViscosity),
-        ("heat_degC_per_rad = 9.0\n", RubbedViscosity),
+        ("thermal_viscosity", {"viscous_per_degC": -0.03}, "ThermalViscosity"),
+        ("thermal_viscosity", {"viscous_per_degC": -0.03, "warm_up_degC": 9.0}, "WarmingViscosity"),
+        ("thermal_viscosity", {"viscous_per_degC": -0.03, "heat_degC_per_rad": 9.0}, "RubbedViscosity"),
+        ("torque_droop", {"droop": 0.1, "rated_torque": 8.0}, "TorqueDroop"),
+        ("torque_droop", {"droop": 0.1, "rated_torque": 8.0, "per_degC": -0.001}, "WarmTorqueDroop"),
     ],
 )
-def test_a_form_is_found_by_its_parameters(numbers: str, form: type[Effect]) -> None:
-    text = f'{SMALL}[[effects]]\neffect = "thermal_viscosity"\nviscous_per_degC = -0.03\n{numbers}'
-    assert [type(one) for one in parse_card(text, "c").effects] == [form]
-
-
-def test_the_known_load_comes_before_the_effects() -> None:
-    assert [effect.id for effect in full().plant().effects] == [
-        "gravity_unbalance",
-        "cogging",
-        "position_friction",
-        "position_friction",
-    ]
+def test_a_form_is_found_by_its_parameters(effect: str, numbers: dict[str, float], form: str) -> None:
+    lines = "".join(f"{key} = {value}\n" for key, value in numbers.items())
+    assert parse_card(f'{SMALL}[[effects]]\neffect = "{effect}"\n{lines}', "c").effects == (FORM[form](**numbers),)
 
 
 def test_defaults_are_those_that_the_contract_states() -> None:

@@ -1,6 +1,7 @@
-"""Whole models against their equations: a plant with all that can stand in a row, set points, pointing."""
+"""Whole models against their equations: a plant with all that stands in a row, corrections, set points, pointing."""
 
 import math
+from dataclasses import replace
 from itertools import product
 from random import Random
 from typing import Any
@@ -8,49 +9,41 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import evaluate, mount
+from effect_examples import FORM, INERTIA, evaluate, example, mount
 
-from pyfmi_models.effects.alt_az import AltitudeInertia
-from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.cable_wrap import CableWrap
-from pyfmi_models.effects.clock_skew import ClockSkew
-from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance
-from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
-from pyfmi_models.effects.inertia_variation import InertiaVariation
-from pyfmi_models.friction import Coulomb
+from pyfmi_models.correction import correction
+from pyfmi_models.effects import ActuatorLag, Cogging, GravityUnbalance, PeriodicFriction, TorqueOffset
+from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.model import Model
+from pyfmi_models.mount import Axis
 from pyfmi_models.pointing import PointingError
 from pyfmi_models.setpoint import Sine
 
 ROW: dict[str, Any] = {
-    "motor": LoadSideCompliance(resonance_hz=60.0, encoder_share=0.6),
-    "spring": Compliance(antiresonance_hz=20.0, resonance_hz=25.0),
-    "play": Backlash(gap_rad=1e-3, load_share=0.3, load_friction=0.2, load_viscous=0.4, load_deflection=1e-3),
-    "varies": InertiaVariation(relative_amplitude=0.3, cycles_per_rev=2.0, phase=0.4),
-    "tube": AltitudeInertia(tube_inertia=0.5),
-    "cable": CableWrap(stiffness=3.0, home=0.2),
-    "encoder": EncoderEccentricity(cycles_per_rev=8.0, amplitude_rad=1e-3, phase=0.3),
-    "clock": ClockSkew(offset_ms=4.0, drift_ppm=100.0),
+    "motor": FORM["LoadSideCompliance"](resonance_hz=60.0, encoder_share=0.6),
+    "spring": FORM["Compliance"](antiresonance_hz=20.0, resonance_hz=25.0),
+    "play": FORM["Backlash"](gap_rad=1e-3, load_share=0.3, load_friction=0.2, load_viscous=0.4, load_deflection=1e-3),
+    "varies": FORM["InertiaVariation"](relative_amplitude=0.3, cycles_per_rev=2.0, phase=0.4),
+    "tube": FORM["AltitudeInertia"](tube_inertia=0.5),
+    "cable": FORM["CableWrap"](stiffness=3.0, home=0.2),
+    "encoder": FORM["EncoderEccentricity"](cycles_per_rev=8.0, amplitude_rad=1e-3, phase=0.3),
+    "clock": FORM["ClockSkew"](offset_ms=4.0, drift_ppm=100.0),
 }
 PLANT = mount(*ROW.values(), friction=Coulomb(Fc=1.0, sigma2=3.0, smoothing=1e-3)).model()
 """An axis of 2 kg m2 with a motor in front of it, a spring and a play behind, and errors of encoder and clock."""
 
 
-def state_names() -> list[str]:
-    return [one.name for one in PLANT.states]
+STATES = [one.name for one in PLANT.states]
 
 
 def number(value: Any) -> float:
     return float(ca.DM(value))
 
 
-def test_the_states_of_a_row_are_those_of_its_parts() -> None:
-    ends = [name.rsplit(".", 1)[-1] for name in state_names()]
-    assert ends == ["position", "speed", *["twist", "twist_rate"] * 3, "bristle"]
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_each_body_of_a_row_obeys_newton_and_outputs_are_what_they_say(seed: int) -> None:
+    ends = [name.rsplit(".", 1)[-1] for name in STATES]
+    assert ends == ["position", "speed", *["twist", "twist_rate"] * 3, "bristle"]
     dice = Random(seed)
     t, q, v, tau, pushed, h, hr = (dice.uniform(-1, 1) for _ in range(7))
     v = 0.0 if seed == 0 else v
@@ -58,7 +51,7 @@ def test_each_body_of_a_row_obeys_newton_and_outputs_are_what_they_say(seed: int
     bristle = dice.uniform(-5e-4, 5e-4)
     values = [q, v, *(one for twist in twists for one in twist), bristle]
     inputs = {"tau": tau, "disturbance": pushed, "altitude": h, "altitude_rate": hr}
-    found = evaluate(PLANT, t, **dict(zip(state_names(), values, strict=True)), **inputs)
+    found = evaluate(PLANT, t, **dict(zip(STATES, values, strict=True)), **inputs)
 
     (mt, mr), (st, sr), (pt, pr) = twists
     J, friction = 2.0, math.tanh(v / 1e-3) + 3.0 * v
@@ -79,7 +72,7 @@ def test_each_body_of_a_row_obeys_newton_and_outputs_are_what_they_say(seed: int
     last_a = (to_last - 0.2 * bristle / 1e-3 - 0.4 * last_speed) / last
     rates = [v, a, mr, motor - a, sr, a - far_a, pr, far_a - last_a]
     rates.append(last_speed - abs(last_speed) * bristle / 1e-3)
-    told = [found[f"der({name})"] for name in state_names()]
+    told = [found[f"der({name})"] for name in STATES]
     np.testing.assert_allclose(told, rates, rtol=1e-9, atol=1e-9)
 
     def read(place: float) -> float:
@@ -135,3 +128,88 @@ def test_a_pointing_error_is_the_angle_between_two_directions(azimuth: float, al
     np.testing.assert_allclose(turned, 0.0, atol=1e-9)
     opposite = at(model, 0.0, [azimuth + math.pi, -altitude, azimuth, altitude])
     assert opposite[2] == pytest.approx(math.pi, abs=1e-7)
+
+
+# What an axis declares, and the limit of its drive.
+
+
+@pytest.mark.parametrize("tau", [-9.0, -5.0, 3.0, 5.0, 50.0])
+def test_the_drive_gives_no_more_than_its_limit(tau: float) -> None:
+    found = evaluate(mount(axis=Axis(inertia=INERTIA, torque_limit=5.0)).model(), tau=tau)
+    assert found["applied"] == np.clip(tau, -5, 5)
+    assert found["der(speed)"] == pytest.approx(np.clip(tau, -5, 5) / INERTIA)
+
+
+def test_a_repeated_effect_has_parameters_of_its_own() -> None:
+    twice = (Cogging(cycles_per_rev=k, amplitude=1.0) for k in (4, 8, 12))
+    names = {v.name: v.start for v in mount(*twice, TorqueOffset(torque=1)).parameters()}
+    assert [names[f"{one}.cycles_per_rev"] for one in ("cogging", "cogging2", "cogging3")] == [4, 8, 12]
+    assert names["torque_offset.torque"] == 1
+
+
+def test_a_linear_axis_has_linear_units() -> None:
+    law = LuGre(sigma0=9.23e4, sigma1=497.0, sigma2=32.77, Fc=2.322, Fs=3.322, Vs=0.04129)
+    forms = ("GravityUnbalance", "Cogging", "RoughSpot", "WarmTorqueDroop", "BoucWen", "GearFriction")
+    effects = [example(FORM[name]) for name in (*forms, "EncoderEccentricity")]
+    model = mount(*effects, friction=law, motion="linear").model()
+    units = {v.name: v.unit for part in (model.inputs, model.outputs, model.states, model.parameters) for v in part}
+    expected = {
+        **{"tau": "N", "disturbance": "N", "q": "m", "v": "m/s", "friction": "N", "applied": "N"},
+        **{"position": "m", "speed": "m/s", "friction.bristle": "N", "axis.inertia": "kg", "axis.torque_limit": "N"},
+        **{"friction.sigma0": "N/m", "friction.sigma1": "N.s/m", "friction.sigma2": "N.s/m"},
+        **{"friction.Fc": "N", "friction.Fs": "N", "friction.Vs": "m/s", "friction.delta": "1"},
+        **{"gravity_unbalance.mgl": "N", "gravity_unbalance.phase": "rad"},
+        **{"cogging.cycles_per_rev": "1", "cogging.amplitude": "N", "cogging.phase": "rad"},
+        **{"rough_spot.q_center": "m", "rough_spot.width": "m", "rough_spot.forward": "1"},
+        **{"torque_droop.rated_torque": "N", "torque_droop.droop": "1", "torque_droop.per_degC": "1/K"},
+        **{"bouc_wen.stroke": "m", "bouc_wen.torque": "N", "gear_friction.driving": "1", "gear_friction.driven": "1"},
+        "encoder_eccentricity.amplitude_rad": "m",
+    }
+    assert {name: units[name] for name in expected} == expected
+    rotary = {variable.name: variable.unit for variable in mount(*effects, friction=law).parameters()}
+    assert rotary["axis.inertia"] == "kg.m2"
+    assert rotary["friction.sigma0"] == "N.m/rad"
+
+
+# The torque that makes a plant do what a better model of it does, at single points of its motion.
+
+WEIGHT = GravityUnbalance(mgl=5.0, phase=0.1)
+WAVE = PeriodicFriction(cycles_per_rev=3, relative_amplitude=0.2, phase=0.4)
+RIPPLE = Cogging(cycles_per_rev=4, amplitude=0.7, phase=0.2)
+
+
+@pytest.mark.parametrize("v", [0.2, -0.3])
+@pytest.mark.parametrize("tau", [0.0, 4.0])
+def test_the_plant_gets_what_the_better_one_needs_and_its_own_friction_back(v: float, tau: float) -> None:
+    plant = mount()
+    better = replace(mount(WEIGHT, WAVE), axis=Axis(inertia=3.0))
+    model, q = correction(plant, better), 0.7
+    (corrected,) = model.outputs
+    assert (corrected.name, corrected.unit) == ("corrected", "N.m")
+    found = evaluate(model, tau=tau, q=q, v=v)[corrected.name]
+    own = np.sign(v) + 3 * v
+    needed = np.sign(v) * (1 + 0.2 * np.cos(3 * q + 0.4)) + 3 * v + 5 * np.sin(q + 0.1)
+    assert found == pytest.approx((tau - needed) * 2 / 3 + own, rel=1e-12)
+    assert (found - own) / 2 == pytest.approx((tau - needed) / 3), "the acceleration of the better one"
+
+
+def test_states_of_both_sides_follow_the_motion_of_the_plant() -> None:
+    """Each side's bristles bend by its own law, each drive lags behind the command by its own time."""
+    law = LuGre(sigma0=1e4, sigma1=20.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.1)
+    other = replace(law, sigma0=2e4, Fc=2.0, Fs=2.5)
+    plant = mount(ActuatorLag(time_constant_ms=40.0), friction=law)
+    better = mount(ActuatorLag(time_constant_ms=10.0), RIPPLE, friction=other)
+    model = correction(plant, better)
+    bent = {"before.friction.bristle": 0.3, "after.friction.bristle": -0.6}
+    own_lag, lag = (one.name for one in model.states if "actuator_lag" in one.name)
+    found = evaluate(model, tau=4.0, q=0.3, v=0.02, **bent, **{own_lag: 3.5, lag: 2.5})
+    for name, one in (("before", law), ("after", other)):
+        z = bent[f"{name}.friction.bristle"]
+        assert found[f"der({name}.friction.bristle)"] == pytest.approx(float(one.rate(z, 0.02, one.level(0.02))))
+    assert found[f"der({own_lag})"] == pytest.approx((4.0 - 3.5) / 40e-3)
+    assert found[f"der({lag})"] == pytest.approx((4.0 - 2.5) / 10e-3)
+    own, needed = (
+        float(one.contact(z, 0.02, one.level(0.02)) + one.viscous(0.02)) for one, z in ((law, 0.3), (other, -0.6))
+    )
+    needed += float(RIPPLE.load(mount().at(0.0, 0.3, 0.02)))
+    assert found["corrected"] == pytest.approx(2.5 - needed + own, rel=1e-12)

@@ -67,12 +67,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
         "waves": (2, 1),
         "level_change": (0.1, 0.2, -0.1, 0.05, 0.1, -0.2),
     },
-    "LearnedViscous": {
-        "over": "acceleration",
-        "seen": (-2.0, 2.0),
-        "viscous_torque": (0.0, 0.3, -0.2),
-        "at_speed": 0.5,
-    },
+    "LearnedViscous": {"over": "acceleration", "seen": (-2, 2), "viscous_torque": (0.0, 0.3, -0.2), "at_speed": 0.5},
     "LearnedGain": {"over": "position", "seen": (-1.0, 1.2), "more_command": (0.0, 0.05, 0.02, -0.01)},
     "LearnedDrive": {"command_seen": (-20.0, 20.0), "missing": (0.0, 0.1, 0.0, -0.2)},
     "LearnedHysteresis": {"strokes": (0.1, 0.4), "torque": (0.2, 0.3)},
@@ -100,10 +95,7 @@ def example(form: type[Effect]) -> Effect:
 
 
 EXAMPLES: tuple[Effect, ...] = tuple(example(form) for form in FORMS)
-
-
-def of_kind(*kinds: type[Effect]) -> list[Effect]:
-    return [one for one in EXAMPLES if isinstance(one, kinds)]
+FORM: dict[str, Any] = {form.__name__: form for form in FORMS}
 
 
 def mount(*effects: Effect, friction: FrictionLaw = LAW, **changes: Any) -> Mount:
