@@ -12,9 +12,9 @@ from attack_targets import Yard
 from attack_worker import Ended
 from investigations import BELIEVED, CABLE
 
-import cosim.api.investigate  # noqa: F401  what is loaded here need not be loaded in each fork
+import cosim_investigation.investigate  # noqa: F401  what is loaded here need not be loaded in each fork
 from cosim.cli import main
-from cosim.investigation.loop import Investigation
+from cosim_investigation.loop import Investigation
 
 Command = list[object]
 NAMES = ("position", "speed", "acceleration", "torque", "frequency", "forbidden", "jerk")

@@ -24,12 +24,12 @@ import numpy as np
 
 from cosim.data.profile import envelope
 from cosim.data.recording import Recording
-from cosim.investigation.limits import Limits
-from cosim.investigation.log import Log
-from cosim.investigation.loop import Investigation, Settings
-from cosim.investigation.motions import Motion as Asked
-from cosim.investigation.story import Answered, Story
 from cosim.support.version import __version__
+from cosim_investigation.limits import Limits
+from cosim_investigation.log import Log
+from cosim_investigation.loop import Investigation, Settings
+from cosim_investigation.motions import Motion as Asked
+from cosim_investigation.story import Answered, Story
 from cosim_studies.proof import intervals
 from cosim_studies.proof.generator import conceal, perturbed, to_toml
 from cosim_studies.proof.motion import Motion

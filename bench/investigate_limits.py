@@ -24,13 +24,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.investigation.design import allowed
-from cosim.investigation.families import FAMILIES
-from cosim.investigation.limits import Limits
-from cosim.investigation.motions import Motion, Tones, room_of
-from cosim.investigation.questions import problem_of
 from cosim.support.errors import HardwareError
 from cosim.support.version import __version__
+from cosim_investigation.design import allowed
+from cosim_investigation.families import FAMILIES
+from cosim_investigation.limits import Limits
+from cosim_investigation.motions import Motion, Tones, room_of
+from cosim_investigation.questions import problem_of
 
 sys.path.append(str(Path(__file__).parent))
 from limits_axes import Axis, axis, on_a_drive, over_udp

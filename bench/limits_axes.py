@@ -21,12 +21,12 @@ from cosim.hardware.simulated import Plant, SimulatedDrive
 from cosim.hardware.structures import CDrive
 from cosim.hardware.virtual import VirtualDrive
 from cosim.hardware.wired import wire_up
-from cosim.investigation.drive import Driven
-from cosim.investigation.limits import Limits
-from cosim.investigation.machine import CoSimulated
-from cosim.investigation.motions import Motion
 from cosim.models.cache import with_fmus
 from cosim.system.scenario import read_scenario
+from cosim_investigation.drive import Driven
+from cosim_investigation.limits import Limits
+from cosim_investigation.machine import CoSimulated
+from cosim_investigation.motions import Motion
 from pyfmi_models.card import Card, read_card
 
 sys.path.append(str(Path(__file__).parents[1] / "tests/tools"))

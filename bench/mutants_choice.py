@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 HOME = Path(__file__).parents[1]
+PRODUCT = ("cosim", "pyfmi_models", *sorted(path.parent.name for path in HOME.glob("cosim_*/__init__.py")))
 MOST, TOGETHER, MANY = 4, 8, 20
 """Imports between a test and a module at most; files of which tests that name what was changed are asked first and
 together, and how many."""
@@ -24,7 +25,7 @@ LOADED = {
     "cosim/master/loop": ("cosim/master/loop/compiled.py",),
     "cosim/estimation/kernels": ("cosim/estimation/kernels/__init__.py",),
     "cosim/estimation/identify": ("cosim/estimation/identify/output_error.py",),
-    "cosim/nesting/c": ("cosim/nesting/source.py",),
+    "cosim_nesting/c": ("cosim_nesting/source.py",),
     "pyfmi_models/export/c": ("pyfmi_models/export/build.py",),
 }
 """What loads the C files of a folder."""

@@ -15,10 +15,8 @@ from functools import cache
 from pathlib import Path
 
 from mutants_blocks import HEAD, blocks, blocks_in_c, innermost
-from mutants_choice import DECLARING, HOME, LOADED, asked, functions, naming, told
+from mutants_choice import DECLARING, HOME, LOADED, PRODUCT, asked, functions, naming, told
 
-PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
-PRODUCT = ("cosim", "pyfmi_models", *PLUG_INS)
 BATCHES = ((4.0, 5), (6.0, 7), (8.0, 9))
 """Seconds and files of tests that are asked together: small at first; the last one is repeated."""
 

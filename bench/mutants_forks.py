@@ -11,12 +11,10 @@ from importlib import import_module
 from math import ceil
 from pathlib import Path
 
-from mutants_choice import HOME
+from mutants_choice import HOME, PRODUCT
 
 HEAVY = ("casadi", "fmpy", "pandas", "pyarrow.parquet", "scipy.signal", "scipy.optimize", "scipy.stats")
 """What is loaded here need not be loaded in each fork."""
-PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
-OURS = ("cosim", *PLUG_INS, "pyfmi_models")
 """What a fork loads anew, from the tree; with it what lies beside this file."""
 
 
@@ -53,7 +51,7 @@ def _moved(place: Path, said: Path, most: int) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
     sys.path[:] = [str(place), *(one for one in sys.path if not _is_of_home(one))]
     beside = {one.stem for one in Path(__file__).parent.glob("*.py")}
-    for module in [one for one in sys.modules if one.split(".")[0] in beside.union(OURS)]:
+    for module in [one for one in sys.modules if one.split(".")[0] in beside.union(PRODUCT)]:
         del sys.modules[module]
     with said.open("w") as output:
         os.dup2(output.fileno(), 1)

@@ -31,13 +31,11 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "cos
 
 import mutants_blocks as marks  # noqa: E402
 from build_hook import LIBRARIES, SUFFIX, compile_library  # noqa: E402
-from mutants_choice import HOME, NOT_ASKED, SLOW  # noqa: E402
+from mutants_choice import HOME, NOT_ASKED, PRODUCT, SLOW  # noqa: E402
 from mutants_forks import forked, preloaded  # noqa: E402
 
 from cosim.support.files import replacing  # noqa: E402
 
-PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
-PRODUCT = ("cosim", "pyfmi_models", *PLUG_INS)
 QUIET = ("-n0", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--timeout=100")
 
 

@@ -16,10 +16,10 @@ import pandas as pd
 
 from cosim.api.diagnose import diagnose
 from cosim.api.recordings import read
-from cosim.simulators import FORMATS
-from cosim.simulators.measure import Held, hold
-from cosim.simulators.motion import along_recording
 from cosim.support.version import __version__
+from cosim_simulators import FORMATS
+from cosim_simulators.measure import Held, hold
+from cosim_simulators.motion import along_recording
 from pyfmi_models.card import Card, read_card
 
 

@@ -18,7 +18,8 @@
 
 SI units inside, other units only where files come in. Time is counted in integer ticks, never summed. Results print
 themselves on a terminal and show themselves in a notebook. A name is loaded when it is first used: `import cosim` alone
-costs next to nothing. What these raise on purpose is a `CosimError` or a `ModelError`, and its text is one sentence.
+costs next to nothing; `investigate`, `check_effect` and `check_law` come from packages that are plugged in. What these
+raise on purpose is a `CosimError` or a `ModelError`, and its text is one sentence.
 """
 
 from importlib import import_module
@@ -31,47 +32,45 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from cosim.api.calibrate import CalibrateResult
     from cosim.api.card import CardResult, card
     from cosim.api.check import CheckResult, check
-    from cosim.api.checks import check_effect, check_law
     from cosim.api.compare import Comparison, compare
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
     from cosim.api.folder import FolderResult, diagnose_folder
     from cosim.api.identify import IdentifyResult, identify
-    from cosim.api.investigate import InvestigateResult, investigate
     from cosim.api.open import open
     from cosim.api.recordings import read
     from cosim.api.run import run
     from cosim.api.show import Shown, show
     from cosim.api.sweep import SweepResult, sweep
-    from cosim.checks.suite import Checks
     from cosim.data.recording import Recording
     from cosim.master.result import RunResult
     from cosim.support.errors import CheckError, CosimError, InputError, StepError
+    from cosim_calibration.front import CalibrateResult as CalibrateResult
+    from cosim_checks.front import check_effect as check_effect
+    from cosim_checks.front import check_law as check_law
+    from cosim_checks.suite import Checks as Checks
+    from cosim_investigation.investigate import InvestigateResult as InvestigateResult
+    from cosim_investigation.investigate import investigate as investigate
     from pyfmi_models.card import Card, read_card
     from pyfmi_models.errors import ModelError
     from pyfmi_models.plugins import load_plugins
 
 _HOMES = {
-    "cosim.api.calibrate": ("CalibrateResult",),
     "cosim.api.card": ("CardResult", "card"),
-    "cosim.api.checks": ("check_effect", "check_law"),
     "cosim.api.check": ("CheckResult", "check"),
     "cosim.api.compare": ("Comparison", "compare"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
     "cosim.api.folder": ("FolderResult", "diagnose_folder"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
-    "cosim.api.investigate": ("InvestigateResult", "investigate"),
     "cosim.api.open": ("open",),
     "cosim.api.recordings": ("read",),
     "cosim.api.run": ("run",),
     "cosim.master.result": ("RunResult",),
     "cosim.api.show": ("Shown", "show"),
     "cosim.api.sweep": ("SweepResult", "sweep"),
-    "cosim.checks.suite": ("Checks",),
     "cosim.data.recording": ("Recording",),
     "cosim.support.errors": ("CheckError", "CosimError", "InputError", "StepError"),
     "pyfmi_models.card": ("Card", "read_card"),
@@ -81,12 +80,10 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "CalibrateResult",
     "Card",
     "CardResult",
     "CheckError",
     "CheckResult",
-    "Checks",
     "Comparison",
     "CosimError",
     "DiagnosisResult",
@@ -94,7 +91,6 @@ __all__ = [
     "FolderResult",
     "IdentifyResult",
     "InputError",
-    "InvestigateResult",
     "ModelError",
     "Recording",
     "RunResult",
@@ -104,14 +100,11 @@ __all__ = [
     "__version__",
     "card",
     "check",
-    "check_effect",
-    "check_law",
     "compare",
     "diagnose",
     "diagnose_folder",
     "export",
     "identify",
-    "investigate",
     "load_plugins",
     "open",
     "read",
@@ -124,11 +117,24 @@ __all__ = [
 
 def __getattr__(name: str) -> "Any":
     """Load a public name from its home, once."""
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'cosim' has no attribute {name!r}; it offers: {', '.join(__all__)}")
-    globals()[name] = found = getattr(import_module(_HOME_OF[name]), name)
+    if name in _HOME_OF:
+        found = getattr(import_module(_HOME_OF[name]), name)
+    elif name in _plugged():
+        from cosim.support.plugins import HANDLES, loaded
+
+        found = loaded(HANDLES, name)
+    else:
+        raise AttributeError(f"module 'cosim' has no attribute {name!r}; it offers: {', '.join(__dir__())}")
+    globals()[name] = found
     return found
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted({*__all__, *_plugged()})
+
+
+def _plugged() -> tuple[str, ...]:
+    """Names that packages add by entry points, those of this project among them."""
+    from cosim.support.plugins import HANDLES, names
+
+    return names(HANDLES)

@@ -9,9 +9,9 @@ import pytest
 
 from bench.investigate_limits import Asked, machine, page, run
 from bench.limits_axes import axis
-from cosim.investigation.families import fast_sweeps
-from cosim.investigation.limits import Limits
-from cosim.investigation.motions import room_of
+from cosim_investigation.families import fast_sweeps
+from cosim_investigation.limits import Limits
+from cosim_investigation.motions import room_of
 
 
 def test_no_designed_motion_leaves_a_limit_on_the_plant_or_on_the_drive(tmp_path: Path) -> None:

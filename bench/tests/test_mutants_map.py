@@ -76,7 +76,7 @@ def test_a_constant_is_looked_for_where_it_is_named_and_a_c_function_where_it_is
     assert nearest == {f"cosim/diagnosis/trust/admission.py:_check_length:{number}" for number in (0, 1)}
     assert {"factorise", "prepare"} < reaching(HOME / "cosim/master/loop/rodas4.c", "factorise")
     assert mutants_chosen.naming_blocks("loop_run")
-    for folder in ("cosim/nesting/c", "pyfmi_models/export/c", "cosim/hardware"):
+    for folder in ("cosim_nesting/c", "pyfmi_models/export/c", "cosim/hardware"):
         for one in (HOME / folder).glob("*.c"):
             assert reaching(one, "") or not mutants_chosen.HEAD.search(one.read_text("utf-8"))
 

@@ -3,23 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from cosim.api.recordings import Source
-from cosim.api.recordings import read as read_recording
 from cosim.delivery.experiment import sines, with_experiment
 from cosim.models.carried import related_of
-from cosim.reading import check_kind
-from cosim.simulators import FORMATS, WHOLE
-from cosim.simulators.deliver import Planned
-from cosim.simulators.deliver import planned as planned_files
-from cosim.simulators.format import Format
-from cosim.simulators.measure import Held
-from cosim.simulators.table import table_text
 from cosim.support.errors import InputError
 from cosim.support.files import check_free, directory
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
+from cosim.support.plugins import EXPORTS, loaded
 from cosim.support.toml import parsed
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
@@ -30,6 +23,27 @@ from pyfmi_models.model import Model
 Fmi = Literal[2, 3]
 Writer = Callable[[Path, bool], object]
 Progress = Callable[[int, int], None]
+
+
+class Held(Protocol):
+    """What a simulator holds of a card and what it loses; `as_json` has the word of the simulator as "simulator"."""
+
+    def as_json(self) -> JsonObject:
+        """Return everything as plain data."""
+        ...
+
+
+class Simulators(Protocol):
+    """Files for other simulators and the table of what they lose, planned by what is plugged in."""
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """All that will be written, the table last."""
+        ...
+
+    def write(self, force: bool) -> Sequence[Held]:
+        """Write all; returns what each simulator holds, in the order of the files."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -59,12 +73,13 @@ class Exported:
         others = {"ssp": self.ssp, "modelica": self.modelica, "modelica_flange": self.flange, "c": self.c}
         found: JsonObject = {"fmus": [str(path) for path in self.fmus]}
         found |= {kind: str(path) for kind, path in others.items() if path}
-        found |= {one.format.key: str(path) for one, path in zip(self.held, self.simulators, strict=False)}
-        return found | ({"table": str(self.table), "held": [one.as_json() for one in self.held]} if self.held else {})
+        held = [one.as_json() for one in self.held]
+        found |= {str(one["simulator"]): str(path) for one, path in zip(held, self.simulators, strict=False)}
+        return found | ({"table": str(self.table), "held": held} if held else {})
 
     def __str__(self) -> str:
         paths = "\n".join(map(str, self.paths))
-        return f"{paths}\n\n{table_text(self.held)}".rstrip() if self.held else paths
+        return f"{paths}\n\n{self.table.read_text('utf-8')}".rstrip() if self.table else paths
 
     def _repr_html_(self) -> str:
         return html_table("Exported", [{"file": path, "bytes": f"{path.stat().st_size:,}"} for path in self.paths])
@@ -142,8 +157,6 @@ def system_as_fmu(
     on_build: Callable[[str], None] = lambda text: None,
 ) -> Exported:
     """Write a system as one FMU; arguments and errors are those of `export`, `on_build` is told of FMUs of cards."""
-    from cosim.api.export_system import export_system
-
     if isinstance(scenario, Card):
         raise InputError("A card is no system: give a scenario (.toml) or an SSP, or leave --as-fmu out.")
     if kinds:
@@ -151,7 +164,7 @@ def system_as_fmu(
         raise InputError(f"{option} is of a card, and --as-fmu of a system; give one of them.", culprit=option)
     if platform != "host":
         raise InputError(f'--as-fmu builds for this computer; --platform "{platform}" is not there.', culprit=platform)
-    return Exported(export_system(scenario, out, fmi, force, on_build))
+    return Exported(loaded(EXPORTS, "system")(scenario, out, fmi, force, on_build))
 
 
 def kinds_of(**asked: bool) -> tuple[str, ...]:
@@ -166,7 +179,7 @@ class Plan:
     archives: tuple[_Archive, ...]
     others: dict[str, tuple[Path, Writer]]
     force: bool
-    simulators: Planned | None = None
+    simulators: Simulators | None = None
 
     def write(self, on_progress: Progress = lambda done, of: None) -> Exported:
         """Write everything; `on_progress` is told how many FMUs are done, and of how many."""
@@ -180,8 +193,8 @@ class Plan:
         found = Exported(tuple(one.path for one in self.archives), ssp, modelica, flange, c)
         if self.simulators is None:
             return found
-        held, files = self.simulators.write(self.force), tuple(path for _, path in self.simulators.files)
-        return replace(found, simulators=files, table=self.simulators.table, held=held)
+        *files, table = self.simulators.paths
+        return replace(found, simulators=tuple(files), table=table, held=tuple(self.simulators.write(self.force)))
 
     def check(self) -> None:
         """Refuse to write over what is there (raises OutputError)."""
@@ -220,8 +233,6 @@ def planned(
     read = card if isinstance(card, Card) else read_card(card)
     stem = Path(read.path).stem or read.plant().name
     versions: tuple[Fmi, ...] = (2, 3) if fmi == "both" else (fmi,)
-    known = FORMATS | WHOLE
-    formats = [form for kind, form in known.items() if kind in kinds]
     others = {kind: make(read, folder, stem) for kind, make in _OTHERS.items() if kind in kinds}
     if "ssp" in kinds:
         others = {"ssp": (folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms))} | others
@@ -229,7 +240,7 @@ def planned(
         archives=tuple(_archives(read, folder, stem, versions, platforms)),
         others=others,
         force=force,
-        simulators=_simulators(read, folder, stem, formats, recording) if formats else None,
+        simulators=loaded(EXPORTS, "simulators")(read, folder, stem, kinds, recording) if kinds else None,
     )
     plan.check()
     return plan
@@ -243,14 +254,6 @@ def _is_system(path: Path) -> bool:
         return path.suffix == ".toml" and path.is_file() and "components" in parsed(path.read_text("utf-8"))
     except (ValueError, OSError):
         return False
-
-
-def _simulators(card: Card, folder: Path, stem: str, formats: Sequence[Format], recording: Source | None) -> Planned:
-    """Name the files for simulators, and read the recording along which they are compared."""
-    taken = None if recording is None else read_recording(recording, columns=card.columns)
-    if taken is not None:
-        check_kind([taken], card.mount.motion)
-    return planned_files(card.plant(), card.path or stem, formats, folder, stem, taken)
 
 
 def _archives(

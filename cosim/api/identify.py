@@ -2,14 +2,11 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
-from cosim.api.calibrate import CalibrateResult, calibrate, subject_of
 from cosim.api.recordings import Source, read_all
-from cosim.calibration.calibrate import Options as Calibration
-from cosim.calibration.fit import Loss
 from cosim.estimation.identify import deliver
 from cosim.estimation.identify.figures import map_figure
 from cosim.estimation.identify.identify import Identified, Options
@@ -18,11 +15,14 @@ from cosim.reading import check_kind
 from cosim.support.errors import InputError
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
+from cosim.support.plugins import IDENTIFIERS, loaded
 from cosim.system.scenario import Scenario
 from pyfmi_models.card import Card, read_card
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from cosim_calibration.front import CalibrateResult
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,7 +90,7 @@ class ForModels(TypedDict, total=False):
     """Seconds after which a simulation starts anew from the recording; None: never."""
     initial: str
     """"recorded" starts windows from readings; "free" finds the start values of each window or recording too."""
-    loss: Loss
+    loss: Literal["linear", "soft_l1"]
     """"linear", or "soft_l1" for recordings with outliers."""
     workers: int | None
     """Processes that simulate; None is one a core."""
@@ -134,7 +134,7 @@ def identify(
     force: bool = False,
     on_progress: Callable[[str], None] = ...,
     **model: Unpack[ForModels],
-) -> CalibrateResult: ...
+) -> "CalibrateResult": ...
 
 
 def identify(
@@ -152,7 +152,7 @@ def identify(
     force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
     **model: Unpack[ForModels],
-) -> IdentifyResult | CalibrateResult:
+) -> "IdentifyResult | CalibrateResult":
     """Identify numbers of a card, of a foreign FMU (`fmu`) or of a whole system (`system`) from recordings.
 
     A card: friction map, presliding steps, output error in closed loop. An FMU or system: output error in open loop,
@@ -188,9 +188,10 @@ def identify(
         _check_none(model)
         given = Options(tuple(free), cut, keep_inertia, starts, seed)
         return _of_card(recordings, card, folder, given, columns, units, force, on_progress)
-    options = _options(model, Calibration(tuple(free), columns=columns or {}, starts=starts, seed=seed))
-    subject, heldout = subject_of(model.get("fmu"), model.get("system"), on_progress), model.get("heldout")
-    return calibrate(recordings, heldout, subject, options, folder, units=units, force=force, on_progress=on_progress)
+    _check_names(model)
+    find_of_model: Callable[..., CalibrateResult] = loaded(IDENTIFIERS, "model")
+    how = {"free": tuple(free), "columns": columns or {}, "starts": starts, "seed": seed}
+    return find_of_model(recordings, model, how, folder, units=units, force=force, on_progress=on_progress)
 
 
 def _check_none(model: ForModels) -> None:
@@ -203,25 +204,6 @@ def _check_none(model: ForModels) -> None:
 def _check_names(model: ForModels) -> None:
     if strange := set(model) - set(ForModels.__annotations__):
         raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
-
-
-def _options(model: ForModels, options: Calibration) -> Calibration:
-    """Join what is said of a model with what is said of any (TypeError for a name that there is not)."""
-    _check_names(model)
-    return replace(
-        options,
-        given=model.get("set") or {},
-        bounds=model.get("bounds") or {},
-        step=model.get("step"),
-        interpolation=model.get("interpolation", options.interpolation),
-        window=model.get("window"),
-        initial=model.get("initial", options.initial),
-        loss=model.get("loss", options.loss),
-        workers=model.get("workers"),
-        timeout=model.get("timeout", options.timeout),
-        cluster=model.get("cluster", options.cluster),
-        derivatives=model.get("derivatives", options.derivatives),
-    )
 
 
 def check_one(*models: object) -> None:

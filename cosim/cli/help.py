@@ -6,7 +6,7 @@ A verb that another package plugs in has both in its module, as `GROUP` and `EXA
 from types import ModuleType
 
 GROUPS = {
-    "Diagnose": ("diagnose", "why", "identify", "card", "compare", "investigate", "show"),
+    "Diagnose": ("diagnose", "why", "identify", "card", "compare", "show"),
     "Simulate": ("run", "export", "sweep", "check"),
     "Machine": ("hardware", "doctor"),
 }
@@ -25,10 +25,6 @@ EXAMPLES = {
     ),
     "card": ("cosim card monday.csv tuesday.csv --out axis.toml", "cosim card run.csv --motion linear --inertia 12"),
     "compare": ("cosim compare monday.csv tuesday.csv", "cosim compare run_1 measured.csv --out difference"),
-    "investigate": (
-        "cosim investigate sidereal --card paper_mount --machine axis.toml --budget 120s",
-        "cosim investigate axis_scenario.toml --card axis.toml --limits speed=0.2 torque=20",
-    ),
     "show": ("cosim show recording.csv", "cosim show cogging"),
     "run": ("cosim run sidereal", "cosim run sidereal --set controller.kp=400 --stop 5 --out tuned"),
     "export": (

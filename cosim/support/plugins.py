@@ -2,6 +2,10 @@
 
     cosim.verbs        a module as those of `cosim.cli`: it has a function of the verb's name, or the typer `app`, its
                        `GROUP` in the help and `EXAMPLES`; "hardware.alpaca" is the verb `cosim hardware alpaca`
+    cosim.handles      a function or class that Python finds in `cosim` by the name
+    cosim.exports      "simulators": plans the files of a card for other simulators, see `cosim.api.export.Simulators`;
+                       "system": writes a system as one FMU
+    cosim.identifiers  "model": what `cosim.identify` calls for an FMU or a system in the place of a card
     cosim.formulas     a function that looks for a closed form in the place of a learned table, see
                        `cosim.diagnosis.terms.closed_form`
     cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
@@ -15,6 +19,7 @@ from typing import Any
 
 from cosim.support.errors import PlugInError
 
+EXPORTS, HANDLES, IDENTIFIERS = "cosim.exports", "cosim.handles", "cosim.identifiers"
 VERBS, TRANSPORTS = "cosim.verbs", "cosim.transports"
 
 
@@ -29,9 +34,11 @@ def loaded(group: str, name: str) -> Any:
     """Import what an entry point names.
 
     Raises:
-        PlugInError: it cannot be imported; one sentence with its package and the reason.
+        PlugInError: there is none, or it cannot be imported; one sentence with its package and the reason.
     """
-    point = _points(group)[name]
+    if name not in (points := _points(group)):
+        raise PlugInError(f'No package that is installed plugs in "{name}" ({group}); reinstall mount-cosim.')
+    point = points[name]
     try:
         return point.load()
     except Exception as error:

@@ -11,8 +11,8 @@ from two_links import TIP, forearm, wrist
 from cosim.diagnosis.diagnose import Outcome, diagnose
 from cosim.diagnosis.trust.admission import check_neighbours
 from cosim.estimation.neighbours import as_inputs
-from cosim.investigation.questions import effect_of
 from cosim.support.errors import RecordingError
+from cosim_investigation.questions import effect_of
 from pyfmi_models.card import CardError, parse_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects.axis_coupling import PRODUCTS, ChainCoupling, SpaceCoupling

@@ -7,9 +7,9 @@ import pytest
 from motor_fmu import driven, motor, recorded
 
 import cosim
-from cosim.calibration.calibrate import Options, calibrate
-from cosim.calibration.residuals import Residuals
-from cosim.calibration.subject import of_fmu
+from cosim_calibration.calibrate import Options, calibrate
+from cosim_calibration.residuals import Residuals
+from cosim_calibration.subject import of_fmu
 
 FREE = ("axis.inertia", "friction.Fc", "friction.sigma2")
 

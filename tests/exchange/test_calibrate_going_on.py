@@ -13,8 +13,8 @@ from experiment_archives import bundle, with_files
 from motor_fmu import motor, recorded
 
 import cosim
-from cosim.calibration.store import Store
 from cosim.support.errors import InputError, OutputError, SweepError
+from cosim_calibration.store import Store
 
 TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.calibration.experiment import Experiment
-from cosim.calibration.fit import fit
-from cosim.calibration.free import Free
-from cosim.calibration.residuals import MOST, Residuals, Rows
+from cosim_calibration.experiment import Experiment
+from cosim_calibration.fit import fit
+from cosim_calibration.free import Free
+from cosim_calibration.residuals import MOST, Residuals, Rows
 
 T = np.linspace(0, 3, 301)
 TRUE = {"a": 2.0, "b": 0.7, "c": -1.0}

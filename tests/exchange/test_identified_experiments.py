@@ -9,9 +9,9 @@ from experiment_archives import FOLDER, bundle, manifest, with_files
 from motor_fmu import driven, motor, recorded
 
 import cosim
-from cosim.calibration.left_behind import MANIFEST, left_behind
 from cosim.fmi.manifest import manifest_of
 from cosim.fmi.own_starts import MEMBER, as_member, own_starts
+from cosim_calibration.left_behind import MANIFEST, left_behind
 
 T = 0.01 * np.arange(101)
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.calibration import fit
-from cosim.calibration.experiment import _on_ticks
-from cosim.calibration.fit import DRAWN, REACH, WIDTHS, Fit, _searched
-from cosim.calibration.uncertainty import _noise
+from cosim_calibration import fit
+from cosim_calibration.experiment import _on_ticks
+from cosim_calibration.fit import DRAWN, REACH, WIDTHS, Fit, _searched
+from cosim_calibration.uncertainty import _noise
 
 SLOPES = np.array([[4.0, 0.0], [0.0, 0.5], [0.0, 0.0], [0.0, 0.0]])
 START, LEFT = np.array([0.3, -0.2]), np.array([0.0, 0.0, 0.02, 0.0])

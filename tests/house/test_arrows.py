@@ -9,7 +9,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
-from imports import FILES, PACKAGES, PLUG_INS, ROOT, imports
+from imports import FILES, PACKAGES, PLUG_INS, ROOT, imports, imports_for_types
 
 from cosim_studies.proof.conduct import TELLS
 
@@ -19,8 +19,8 @@ FLOORS = (
     {"cosim.fmi", "cosim.reading"},
     {"cosim.system"},
     {"cosim.master", "cosim.plots"},
-    {"cosim.nesting", "cosim.hardware", "cosim.sweeps", "cosim.models", "cosim.estimation"},
-    {"cosim.calibration", "cosim.experiments"},
+    {"cosim.hardware", "cosim.sweeps", "cosim.models", "cosim.estimation"},
+    {"cosim_calibration", "cosim.experiments"},
     {"cosim.diagnosis.answer"},
     {"cosim.diagnosis.decide"},
     {"cosim.diagnosis.effects"},
@@ -32,7 +32,6 @@ FLOORS = (
     {"cosim.diagnosis"},
     {"cosim.report"},
     {"cosim.delivery"},
-    {"cosim.investigation", "cosim.checks", "cosim.simulators"},
     {"cosim.api"},
     {"cosim", "cosim.cli"},
     {"cosim.__main__"},
@@ -43,11 +42,19 @@ FLOOR_OF = {folder: number for number, floor in enumerate(FLOORS) for folder in 
 HIGHEST = {"cosim", "cosim.api", "cosim.cli", *PLUG_INS}
 ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 2}
 KNOW_PHYSICS = (
-    ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
+    ROOMS
+    | {
+        "cosim.diagnosis",
+        "cosim.report",
+        "cosim.delivery",
+    }
+    | HIGHEST
 )
-KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators", "cosim.nesting"}
+KNOW_PHYSICS |= {"cosim.models", "cosim.estimation"}
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
+FRONT = ("cosim", "cosim.api")
+"""What Python code calls first."""
 EXPORT_READS = ("pyfmi_models.model", "pyfmi_models.errors", "pyfmi_models.export")
 C_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 C_FUNCTION = re.compile(r"^(?!static)(?:[A-Za-z_][\w *]*[ *])(\w+)\([^;{}]*\)\n\{", re.MULTILINE)
@@ -55,7 +62,9 @@ C_FUNCTION = re.compile(r"^(?!static)(?:[A-Za-z_][\w *]*[ *])(\w+)\([^;{}]*\)\n\
 
 @cache
 def ours(name: str) -> frozenset[str]:
-    return frozenset({other for other in imports(name) if other in FILES} - {name})
+    """What a module of ours imports of ours; the front door may name types that plug-ins bring, for editors alone."""
+    types = {one for one in imports_for_types(name) if belongs(one, *PLUG_INS)} if belongs(name, *FRONT) else set()
+    return frozenset({other for other in imports(name) - types if other in FILES} - {name})
 
 
 def belongs(name: str, *rooms: str) -> bool:

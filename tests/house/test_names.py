@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -20,7 +21,8 @@ TO_WRITE = {"herschel_bulkley.py", "wind_load.py", "wind_load", "my_drive.py", "
 """Files that a reader is told to write, or that an export makes."""
 MOVED = {"cosim.stiffness"}
 """Names that the changelog says were moved."""
-GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses", "cosim.formulas", "cosim.verbs", "cosim.transports"}
+GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses"}
+GROUPS |= set(tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"])
 """Entry points by which other packages bring their own."""
 OTHERS = {"scope_files.c", "csv_output.py"}
 """Files of other projects that a page or docstring says are read."""

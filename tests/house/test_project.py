@@ -6,18 +6,13 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
 
 import pytest
 
 import cosim
-import cosim_ethercat
-import cosim_formulas
-import cosim_observatory
-import cosim_serve
-import cosim_studies
-import pyfmi_models
 from bench import scores
 from bench.rebuild import PAGES
 from cosim.cli.verbs import verbs
@@ -28,13 +23,11 @@ from pyfmi_models.effects import CATALOGUE
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "results"
 README = (ROOT / "README.md").read_text("utf-8")
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+WRITTEN = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+PROJECT, WHEEL = WRITTEN["project"], WRITTEN["tool"]["hatch"]["build"]["targets"]["wheel"]
 START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
 TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
-PACKAGES = {
-    one.__name__: one
-    for one in (cosim, cosim_ethercat, cosim_formulas, cosim_observatory, cosim_serve, cosim_studies, pyfmi_models)
-}
+PACKAGES = {name: import_module(name) for name in WHEEL["packages"]}
 SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
 CALLED = {"sklearn": "scikit-learn"}
 """Optional packages that are installed by another name than they are imported by."""
@@ -105,6 +98,11 @@ def test_the_version_is_stated_once_and_is_a_release_or_in_the_making() -> None:
         assert version(PROJECT["name"]) == cosim.__version__
     except PackageNotFoundError:
         pytest.skip("the package is not installed here")
+
+
+def test_every_package_is_in_the_wheel_and_checked_for_types() -> None:
+    there = {path.parent.name for path in ROOT.glob("*/__init__.py")} - FOLDERS | {"cosim", "pyfmi_models"}
+    assert set(WHEEL["packages"]) == set(WRITTEN["tool"]["mypy"]["packages"]) == there
 
 
 def test_every_file_of_the_packages_is_installed() -> None:

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.api.rounds import Rounds
 from cosim.data.recording import Recording
 from cosim.diagnosis.measure.experiment import best, in_words, motions, scenario
 from cosim.estimation.prepare import Piece, Prepared, prepare
-from cosim.investigation.design import piece_of
-from cosim.investigation.families import fast_tone, reversal_ladder, slow_sweep, stop_and_go, tone
-from cosim.investigation.ground import new_ground, visited
-from cosim.investigation.limits import Limits
-from cosim.investigation.motions import Motion, Room, room_of
-from cosim.investigation.story import Answered, Moved, Story
 from cosim.system.scenario import read_scenario
+from cosim_investigation.design import piece_of
+from cosim_investigation.families import fast_tone, reversal_ladder, slow_sweep, stop_and_go, tone
+from cosim_investigation.ground import new_ground, visited
+from cosim_investigation.limits import Limits
+from cosim_investigation.motions import Motion, Room, room_of
+from cosim_investigation.rounds import Rounds
+from cosim_investigation.story import Answered, Moved, Story
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, TorqueOffset
 

@@ -11,16 +11,16 @@ import pytest
 from commands import call
 from investigations import CABLE, LIMITS, STIFFENING, written
 
-from cosim.api.investigate import investigate
-from cosim.cli.investigate import seconds_of
 from cosim.data.recording import Recording
-from cosim.investigation.design import torque_predicted
-from cosim.investigation.machine import CoSimulated
-from cosim.investigation.motions import Motion
-from cosim.investigation.page import write_page
-from cosim.investigation.story import Moved
 from cosim.support.errors import InputError, OutputError
 from cosim.system.scenario import read_scenario
+from cosim_investigation.design import torque_predicted
+from cosim_investigation.investigate import investigate
+from cosim_investigation.machine import CoSimulated
+from cosim_investigation.motions import Motion
+from cosim_investigation.page import write_page
+from cosim_investigation.story import Moved
+from cosim_investigation.verb import seconds_of
 from pyfmi_models.card import read_card
 
 
@@ -154,8 +154,8 @@ def test_the_command_that_is_recorded_asks_for_the_same(options: str, monkeypatc
         asked.append({"given": given, **options, "on_progress": None, "on_step": None})
         raise InputError("enough")
 
-    monkeypatch.setattr(sys.modules["cosim.api.investigate"], "investigate", noted)
-    monkeypatch.setattr("cosim.cli.investigate.machine_of", lambda *given: given)
+    monkeypatch.setattr(sys.modules["cosim_investigation.investigate"], "investigate", noted)
+    monkeypatch.setattr("cosim_investigation.verb.machine_of", lambda *given: given)
     call("investigate", "axis.toml", *split(options))
     recorded = str(asked[0]["command"])
     call(*split(recorded)[1:])

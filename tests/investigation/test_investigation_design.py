@@ -8,13 +8,13 @@ import pytest
 from investigations import CABLE, written
 
 from cosim.estimation.problem import Problem
-from cosim.investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare, strayed
-from cosim.investigation.families import creep, fast_sweeps, fast_tone, slow_sweep
-from cosim.investigation.limits import Limits
-from cosim.investigation.machine import CoSimulated
-from cosim.investigation.motions import Rest, room_of
-from cosim.investigation.questions import Duel, Question, problem_of
 from cosim.system.scenario import read_scenario
+from cosim_investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare, strayed
+from cosim_investigation.families import creep, fast_sweeps, fast_tone, slow_sweep
+from cosim_investigation.limits import Limits
+from cosim_investigation.machine import CoSimulated
+from cosim_investigation.motions import Rest, room_of
+from cosim_investigation.questions import Duel, Question, problem_of
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
 

@@ -7,16 +7,16 @@ import pytest
 from commands import call
 from investigations import CABLE, on_a_drive, written
 
-from cosim.api.investigate import investigate
-from cosim.cli.investigate import seconds_of
 from cosim.data.recording import Recording
 from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.words import ENTERED
-from cosim.investigation.drive import thinned
-from cosim.investigation.families import FAMILIES
-from cosim.investigation.limits import LARGEST, SMALLEST, Limits, frequency_of
-from cosim.investigation.motions import room_of
 from cosim.support.errors import HardwareError, InputError
+from cosim_investigation.drive import thinned
+from cosim_investigation.families import FAMILIES
+from cosim_investigation.investigate import investigate
+from cosim_investigation.limits import LARGEST, SMALLEST, Limits, frequency_of
+from cosim_investigation.motions import room_of
+from cosim_investigation.verb import seconds_of
 
 ABSURD = ("inf", "-inf", "nan", "1e308", "1e-300", "1e999", "-1", "0", "", "1:2:3", "x")
 

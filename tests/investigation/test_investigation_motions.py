@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.data.recording import Recording
-from cosim.investigation.families import FAMILIES, fast_sweeps, motions, slow_sweep, stop_and_go
-from cosim.investigation.limits import Limits
-from cosim.investigation.motions import FADE, Motion, Rest, Room, Tones, room_of
 from cosim.support.errors import InputError
+from cosim_investigation.families import FAMILIES, fast_sweeps, motions, slow_sweep, stop_and_go
+from cosim_investigation.limits import Limits
+from cosim_investigation.motions import FADE, Motion, Rest, Room, Tones, room_of
 
 SIZES = st.floats(1e-3, 10.0)
 LIMITS = Limits(-1.0, 1.0, 0.5, 2.0, 50.0, 5.0)

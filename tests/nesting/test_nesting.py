@@ -19,13 +19,13 @@ from cosim.api.export import export
 from cosim.data.signals import Noise, Steps
 from cosim.master.simulate import simulate
 from cosim.models.cache import with_fmus
-from cosim.nesting.nest import nest
 from cosim.support.errors import StepError, WiringError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.faults import Freeze
 from cosim.system.scenario import read_scenario
 from cosim.system.system import Fmu, Function, System
 from cosim.system.wire import Record, Wire
+from cosim_nesting.nest import nest
 
 Tiny = dict[int, Path]
 STEP, TICKS = 0.05, 120

@@ -14,8 +14,8 @@ from commands import call
 from report_example import report_of
 
 from cosim.data.recording import Recording
-from cosim.investigation.page import write_page
-from cosim.investigation.story import Answered, Moved, Story
+from cosim_investigation.page import write_page
+from cosim_investigation.story import Answered, Moved, Story
 from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation

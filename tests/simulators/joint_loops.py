@@ -6,7 +6,7 @@ import numpy as np
 from nested_runs import InFmpy
 
 from cosim.estimation.filters import lowpass
-from cosim.simulators.motion import PERIODS, top_speed
+from cosim_simulators.motion import PERIODS, top_speed
 from pyfmi_models.export import export_fmu
 from pyfmi_models.mount import Mount
 

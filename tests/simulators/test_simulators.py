@@ -10,9 +10,9 @@ from commands import call
 from joint_loops import PERIOD, apart, in_fmu, in_mujoco
 
 from cosim.api.export import export
-from cosim.simulators import FORMATS
-from cosim.simulators.measure import Held, hold
-from cosim.simulators.motion import along_default
+from cosim_simulators import FORMATS
+from cosim_simulators.measure import Held, hold
+from cosim_simulators.motion import along_default
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash

@@ -8,8 +8,8 @@ from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 
 from cosim.master.simulate import simulate
-from cosim.nesting.nest import nest
 from cosim.system.system import System
+from cosim_nesting.nest import nest
 
 Rows = dict[str, np.ndarray]
 
