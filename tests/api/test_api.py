@@ -14,6 +14,7 @@ import pytest
 import cosim
 from cosim.api.diagnose import check_split
 from cosim.data.recording import Recording
+from cosim.support.plugins import HANDLES, names
 from pyfmi_models.friction import LuGre
 
 FUNCTIONS = ("diagnose", "export", "identify", "read", "run", "show")
@@ -34,7 +35,8 @@ def table(rows: int = 400) -> dict[str, np.ndarray]:
 
 def test_all_names_exist_and_every_function_and_class_says_what_it_is() -> None:
     assert sorted(cosim.__all__) == cosim.__all__
-    assert {"investigate", "check_effect", "check_law", *cosim.__all__} <= set(dir(cosim))  # some are plugged in
+    assert dir(cosim) == sorted({*cosim.__all__, *names(HANDLES)})  # some are plugged in
+    assert {"investigate", "check_effect", "check_law"} <= set(dir(cosim))
     for name in dir(cosim):
         assert hasattr(cosim, name), name
         assert inspect.getdoc(getattr(cosim, name)), name

@@ -112,7 +112,3 @@ def test_a_sweep_is_called_from_python_and_tells_its_best_run(scenario: Path, tm
     assert str(found).startswith(f"best by error: run {best['run']} with ")
     assert len(found.plot().axes) == 1
     assert repr(found).startswith("SweepResult(3 runs, table=")
-
-
-def test_only_public_names_are_listed() -> None:
-    assert dir(cosim) == sorted(cosim.__all__)

@@ -1,6 +1,5 @@
 """Progress in a notebook: one line that is written over and gone at the end; nothing elsewhere."""
 
-import importlib
 import inspect
 import sys
 from inspect import Parameter, signature
@@ -17,6 +16,7 @@ from report_example import diagnosis
 import cosim
 from cosim.api.diagnose import DiagnosisResult
 from cosim.api.tables import missing_frame
+from cosim.cli.verbs import module_of
 from cosim.data.recording import Recording
 from cosim.support.notebook import shows_progress
 from cosim_serve import example
@@ -187,7 +187,7 @@ VERBS = ("run", "diagnose", "export", "show", "sweep", "investigate", "card", "c
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_command_line_and_python_offer_the_same(verb: str) -> None:
-    command: Any = getattr(importlib.import_module(f"cosim.cli.{verb}"), verb)
+    command: Any = getattr(module_of(verb), verb)
     options = {SAME.get(verb, {}).get(name, name) for name in inspect.signature(command).parameters}
     arguments = set(inspect.signature(getattr(cosim, verb)).parameters)
     assert options - (set(METHODS) - arguments) <= arguments, "on the command line only"
