@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search.stages import CandidateFit
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,12 @@ class Fitted:
 def fitted(names: str, count: int = 0, left: float = 0.0) -> Fitted:
     """A fit of effects of one letter each."""
     return Fitted(Structure(tuple(Named(one) for one in names)), count, left)
+
+
+def candidate(names: str, evidence: float, count: int = 0, removes: float = 0.5) -> CandidateFit:
+    """The last of some effects beside the others, and what it is worth there."""
+    fit = fitted(names, count, float(np.sqrt(1 - removes)))
+    return CandidateFit(Named(names[-1]), fit, evidence, 0.0, removes)  # type: ignore[arg-type]
 
 
 class Tables:

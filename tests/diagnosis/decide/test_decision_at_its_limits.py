@@ -1,16 +1,19 @@
 """The decision exactly at its limits, with round constants: on which side each limit itself lies."""
 
+import itertools
 import json
 from dataclasses import replace
-from math import exp
+from math import exp, log
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from bench import calibration as benchmark
 from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
-from cosim.diagnosis.decide.calibration import calibrated
+from cosim.diagnosis.decide.calibration import OFFSET, SLOPE, calibrated
 from cosim.diagnosis.decide.decision import (
     IN_BURSTS,
     Decision,
@@ -52,8 +55,8 @@ def left(*terms: TermScores, share: float = 0.0, there: float = 0.0) -> Residual
     return ResidualScores(share, there, terms)
 
 
-def unknown(evidence: float, share: float) -> bool:
-    return is_left([], left(TermScores("position", evidence, share)), ROUND)
+def position(evidence: float, share: float) -> ResidualScores:
+    return left(TermScores("position", evidence, share))
 
 
 def test_a_rival_at_the_margin_of_a_set_is_beaten_and_the_closest_comes_first() -> None:
@@ -111,43 +114,47 @@ def test_an_effect_stands_from_its_limits_on(gain: Gain, expected: bool) -> None
 def test_a_name_may_imitate_what_is_left_up_to_its_limits(
     evidence: float, explains: float, rest: float, expected: bool
 ) -> None:
-    found = doubted([effect("delay", evidence, explains)], left(TermScores("position", rest, 0.0)), ROUND)
+    found = doubted([effect("delay", evidence, explains)], position(rest, 0.0), ROUND)
     assert found == (("delay",) if expected else ())
 
 
-def test_a_residual_is_large_beyond_its_limit_in_training_or_held_out() -> None:
-    assert not is_left([], left(share=0.1875, there=0.25), ROUND)
-    assert is_left([], left(share=0.1875 + LITTLE), ROUND)
-    assert is_left([], left(there=0.25 + LITTLE), ROUND)
-    assert not is_left([], ResidualScores(0.0, 0.0, share_beside=0.125), ROUND)
-    assert is_left([], ResidualScores(0.0, 0.0, share_beside=0.125 + LITTLE), ROUND)
-
-
 @pytest.mark.parametrize(
-    ("share", "least"),
+    ("named", "residual", "unknown"),
     [
-        (0.25, 8.0),  # followed
-        (0.25 - LITTLE, 16.0),
-        (0.0, 16.0),
-        (-LITTLE, 128.0),  # the error grows
+        pytest.param([], left(share=0.1875, there=0.25), False, id="as much as may be left"),
+        pytest.param([], left(share=0.1875 + LITTLE), True, id="more in training"),
+        pytest.param([], left(there=0.25 + LITTLE), True, id="more held out"),
+        pytest.param([], ResidualScores(0.0, 0.0, share_beside=0.125), False, id="as much as may be beside"),
+        pytest.param([], ResidualScores(0.0, 0.0, share_beside=0.125 + LITTLE), True, id="more beside"),
+        # The evidence that is asked goes with what held-out recordings say.
+        pytest.param([], position(8.0, 0.25), True, id="followed"),
+        pytest.param([], position(8.0 - LITTLE, 0.25), False, id="followed, less evidence"),
+        pytest.param([], position(16.0, 0.25 - LITTLE), True, id="hardly followed"),
+        pytest.param([], position(16.0 - LITTLE, 0.25 - LITTLE), False, id="hardly followed, less evidence"),
+        pytest.param([], position(16.0, 0.0), True, id="not followed"),
+        pytest.param([], position(16.0 - LITTLE, 0.0), False, id="not followed, less evidence"),
+        pytest.param([], position(128.0, -LITTLE), True, id="the error grows"),
+        pytest.param([], position(128.0 - LITTLE, -LITTLE), False, id="the error grows, less evidence"),
+        pytest.param([effect("delay", 80.0, 0.9)], position(20.0, 0.5), True, id="a share of a sure name's evidence"),
+        pytest.param([effect("delay", 80.0, 0.9)], position(20.0 - LITTLE, 0.5), False, id="less than that share"),
     ],
 )
-def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say(share: float, least: float) -> None:
-    assert unknown(least, share)
-    assert not unknown(least - LITTLE, share)
+def test_something_unknown_is_left_from_its_limits_on(
+    named: list[EffectScores], residual: ResidualScores, unknown: bool
+) -> None:
+    assert is_left(named, residual, ROUND) is unknown
 
 
-def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
-    one = EffectScores(
-        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 17.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
-    )
-    alone, beside = (
-        decide(Scores([one], left(share=share)), replace(ROUND, fair=4.0, clear=16.0)) for share in (0.0, 1.0)
-    )
+def test_beside_what_has_no_name_or_was_learned_for_it_a_margin_counts_for_a_share() -> None:
+    explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+    one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 17.0}, explained)
+    rules = replace(ROUND, fair=4.0, clear=16.0)
+    alone, beside = (decide(Scores([one], left(share=share)), rules) for share in (0.0, 1.0))
     assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
     assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
     odds = beside.probabilities["cable_wrap"]
     assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
+    assert beside_rest([one], ("time",), rules) == beside
 
 
 def test_a_wave_behind_a_name_of_one_shape_is_as_likely_as_what_is_further_behind_by_what_it_would_be_asked() -> None:
@@ -161,25 +168,9 @@ def test_a_wave_behind_a_name_of_one_shape_is_as_likely_as_what_is_further_behin
     assert 0 < wave["cogging"] < 0.05 * wave["cable_wrap"], "it stays in the set"
 
 
-def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
-    explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
-    one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
-    rules = replace(ROUND, fair=4.0, clear=16.0)
-    learned, seen = beside_rest([one], ("time",), rules), decide(Scores([one], left(share=1.0)), rules)
-    assert learned == seen
-    assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
-
-
-def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
-    sure = effect("delay", 80.0, 0.9)
-    assert is_left([sure], left(TermScores("position", 20.0, 0.5)), ROUND)
-    assert not is_left([sure], left(TermScores("position", 20.0 - LITTLE, 0.5)), ROUND)
-
-
 def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     weak = effect("delay", 20.0, 0.5)
-    residual = left(TermScores("position", 16.0, 0.5))
-    found = decide(Scores([weak], residual), ROUND)
+    found = decide(Scores([weak], position(16.0, 0.5)), ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
     assert decide(Scores([weak], left()), ROUND).doubtful == ()
 
@@ -309,19 +300,25 @@ CASES = [
 ]
 
 
+def of_json(stored: Any) -> Scores:
+    return Scores.of_json(json.loads(json.dumps(stored)))
+
+
 @pytest.mark.parametrize("scores", CASES)
 def test_stored_scores_are_decided_as_they_were(scores: Scores) -> None:
-    stored = json.loads(json.dumps(scores.as_json()))
-    assert decide(Scores.of_json(stored), POLICY) == decide(scores, POLICY)
+    assert decide(of_json(scores.as_json()), POLICY) == decide(scores, POLICY)
 
 
-def test_scores_of_an_earlier_policy_are_decided_too() -> None:
+def test_stored_scores_of_an_earlier_policy_or_for_another_are_decided_too() -> None:
     """Up to policy 6 terms had three scores more, and nothing said whether the model improves."""
-    stored = json.loads(json.dumps(CASES[2].as_json()))
+    stored: Any = CASES[2].as_json()
     del stored["improves"]
     stored["rest"]["terms"][0] |= {"away": 0.9, "plain": 0.4, "predicted": 12.0}
     stored["learned"] |= {"away": 0.9}
-    assert decide(Scores.of_json(stored), POLICY) == decide(CASES[2], POLICY)
+    assert decide(of_json(stored), POLICY) == decide(CASES[2], POLICY)
+    nothing_learned = of_json(CASES[1].as_json())
+    assert decide(nothing_learned, POLICY).sets == {"cogging": ("position_friction",)}
+    assert decide(nothing_learned, replace(POLICY, fair=1.0)).sets == {"cogging": ()}
 
 
 @pytest.mark.parametrize(
@@ -332,13 +329,38 @@ def test_what_is_no_score_is_said_in_one_sentence(stored: Any) -> None:
         Scores.of_json(stored)
 
 
-def test_another_policy_may_decide_otherwise() -> None:
-    stored = Scores.of_json(json.loads(json.dumps(CASES[1].as_json())))
-    assert decide(stored, POLICY).sets == {"cogging": ("position_friction",)}
-    assert decide(stored, replace(POLICY, fair=1.0)).sets == {"cogging": ()}
-
-
 def test_the_decision_imports_no_arrays() -> None:
     text = Path(decide.__code__.co_filename).read_text("utf-8")
     assert "numpy" not in text
     assert "estimation" not in text
+
+
+# From shares of the evidence to probabilities.
+
+PAIRS = json.loads((Path(__file__).parents[3] / "results" / "abroad" / "pairs.json").read_text("utf-8"))["pairs"]
+
+
+def test_the_curve_rises_keeps_its_order_and_can_be_turned_back() -> None:
+    shares = np.linspace(0.001, 0.999, 50)
+    told = [calibrated(share) for share in shares]
+    assert all(low < high for low, high in itertools.pairwise(told))
+    assert [benchmark.share_of(one) for one in told] == pytest.approx(list(shares), rel=1e-9)
+    assert all(0 < calibrated(edge) < 1 for edge in (0.0, 1.0))
+    assert calibrated(0.1) < 0.5 < 0.9 < calibrated(0.9)
+    # So it came true in the decks of both generators; a curve that is one too high says .94.
+    assert 0.8 < calibrated(0.5) < 0.9
+    assert calibrated(0.5) == pytest.approx(1 / (1 + exp(-OFFSET)))
+
+
+@pytest.mark.parametrize(
+    ("offset", "slope", "refuted"), [(OFFSET, SLOPE, False), (OFFSET, 2 * SLOPE, True), (OFFSET - 1.2, SLOPE, True)]
+)
+def test_fresh_cases_do_not_refute_the_curve_and_would_refute_another(
+    offset: float, slope: float, refuted: bool
+) -> None:
+    """On 57 effects that it was not fitted to: 9.2 of chi-squared of 2 is exceeded by chance once in a hundred."""
+
+    def likelihood(*curve: float) -> float:
+        return sum(log(p if true else 1 - p) for p, true in ((calibrated(s, *curve), t) for s, t in PAIRS))
+
+    assert (2 * (likelihood(*benchmark.fitted(PAIRS)) - likelihood(offset, slope)) > 9.2) is refuted
