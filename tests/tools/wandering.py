@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -30,3 +32,10 @@ def recorded(tau: np.ndarray, t: np.ndarray, q: np.ndarray, name: str = "run") -
 
 def axis(inertia: float = 5.0, Fc: float = 2.0, effects: tuple = ()) -> Mount:
     return Mount(name="axis", axis=Axis(inertia=inertia), friction=Coulomb(Fc=Fc, sigma2=1.0), effects=effects)
+
+
+def posed(mount: Mount, recordings: Sequence[Recording], cutoff: float, slowest: float = 0.0) -> Problem:
+    """What is fitted to recordings; rows that are slower than `slowest` do not count."""
+    prepared = prepare(recordings, cutoff)
+    weight = (np.abs(prepared.stacked("v")) >= slowest).astype(float)
+    return Problem(mount, prepared, weight, recordings[0].sample_time)

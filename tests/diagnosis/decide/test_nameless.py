@@ -1,5 +1,6 @@
 """A name leaves where something without a name explains far more in its place; where it does not, the name stays."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,6 @@ from motions import RATE, Array, Motion
 
 from cosim.data.recording import Recording
 from cosim.diagnosis import diagnose as whole
-from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.answer.scores import ResidualScores, Scores
 from cosim.diagnosis.decide.decision import decide, followed
 from cosim.diagnosis.decide.policy import POLICY
@@ -44,24 +44,26 @@ class Preferring:
 
 
 @pytest.fixture(scope="module")
-def rippling_motor(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, tuple[Any, ...]]:
-    """What is said of a machine, and what `nameless` was asked."""
+def motor(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """What is said of a machine, what `nameless` was asked, the one effect that stands, and all terms by name."""
     folder = tmp_path_factory.mktemp("motor")
     seed, concealed, size = RIPPLING_MOTOR
     write_given(make_case(seed, [concealed], size, machine=ANY), folder)
-    card, train, held = given(str(folder))
-    asked: list[tuple[Any, ...]] = []
+    card, train, there = given(str(folder))
+    asked: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(whole, "nameless", lambda *parts: (asked.append(parts), nameless(*parts))[1])
-        return whole.diagnose(train, [held], card).diagnosis, asked[0]
+        names = ("comparison", "examined", "proof", "held")
+        patch.setattr(whole, "nameless", lambda *a: (asked.update(zip(names, a, strict=True)), nameless(*a))[1])
+        said = whole.diagnose(train, [there], card).diagnosis
+    (effect,), problem = asked["proof"].standing, asked["comparison"].problem
+    beside = problem.without(asked["proof"].chosen, effect.effect.id)
+    terms = {one.name: one for one in candidate_terms(problem.mount, problem.prepared)}
+    return SimpleNamespace(said=said, **asked, effect=effect, beside=beside, terms=terms)
 
 
-def test_a_torque_constant_that_waves_is_no_friction_over_position(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
-) -> None:
-    said, _ = rippling_motor
-    assert said.verdict == ("unknown",)
-    assert said.depends_on == ("torque and position",)
+def test_a_torque_constant_that_waves_is_no_friction_over_position(motor: Any) -> None:
+    said = motor.said
+    assert (said.verdict, said.depends_on) == (("unknown",), ("torque and position",))
     taken = next(one for one in said.findings if one.effect == "position_friction")
     assert taken.answer == "not_proven"
     assert taken.evidence == "what goes with torque and position explains more in its place"
@@ -69,34 +71,25 @@ def test_a_torque_constant_that_waves_is_no_friction_over_position(
     assert said.heldout.after_rms < 0.5 * said.heldout.before_rms
 
 
-def test_a_name_is_not_taken_by_less_than_excludes_a_rival(rippling_motor: tuple[Diagnosis, tuple[Any, ...]]) -> None:
-    _, (comparison, examined, proof, held) = rippling_motor
-    never = replace(comparison.policy, clear=1e4)
-    left = nameless(replace(comparison, policy=never), examined, proof, held)
+def test_a_name_is_not_taken_by_less_than_excludes_a_rival_or_where_held_out_recordings_contradict(
+    motor: Any,
+) -> None:
+    never = replace(motor.comparison.policy, clear=1e4)
+    left = nameless(replace(motor.comparison, policy=never), motor.examined, motor.proof, motor.held)
     assert left.taken == ()
-    assert left.proof is proof
+    assert left.proof is motor.proof
+    contradict = Preferring(motor.held, motor.proof.chosen.mount, 1e6)
+    assert nameless(motor.comparison, motor.examined, motor.proof, contradict).taken == ()
 
 
-def test_a_name_is_not_taken_where_held_out_recordings_contradict(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
-) -> None:
-    _, (comparison, examined, proof, held) = rippling_motor
-    assert nameless(comparison, examined, proof, Preferring(held, proof.chosen.mount, 1e6)).taken == ()
-
-
-def test_what_held_out_recordings_prefer_one_term_to_two_names_by_is_evidence(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
-) -> None:
+def test_what_held_out_recordings_prefer_one_term_to_two_names_by_is_evidence(motor: Any) -> None:
     """To two alone; and training may prefer each of them by what excludes a rival."""
-    comparison, _, proof, held = rippling_motor[1]
-    (effect,) = proof.standing
-    beside = comparison.problem.without(proof.chosen, effect.effect.id)
-    tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
-    two = _Challenge((effect, effect), tried["torque and position"], 0.0, beside)
-    own, least = _held(comparison, Nameless(proof), two, held)[1], comparison.policy.clear
+    comparison, proof, effect = motor.comparison, motor.proof, motor.effect
+    two = _Challenge((effect, effect), motor.terms["torque and position"], 0.0, motor.beside)
+    own, least = _held(comparison, Nameless(proof), two, motor.held)[1], comparison.policy.clear
 
     def lead(train: float, nats: float, names: int = 2) -> tuple[bool, float]:
-        prefers, asked = Preferring(held, proof.chosen.mount, own - nats), replace(two, effects=(effect,) * names)
+        prefers, asked = Preferring(motor.held, proof.chosen.mount, own - nats), replace(two, effects=(effect,) * names)
         return _held(comparison, Nameless(proof), replace(asked, lead=train), prefers)
 
     assert lead(0.0, 12.0) == (True, pytest.approx(12.0))
@@ -108,59 +101,43 @@ def test_what_held_out_recordings_prefer_one_term_to_two_names_by_is_evidence(
     assert not lead(12.0, -least - 1, names=1)[0]
 
 
+@pytest.mark.parametrize(("name", "takes"), [("torque and position", True), ("speed and position", False)])
 def test_a_term_that_raises_the_held_out_error_takes_no_name_however_many_nats_it_leads_by(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+    name: str, takes: bool, motor: Any
 ) -> None:
-    comparison, _, proof, held = rippling_motor[1]
-    (effect,) = proof.standing
-    beside = comparison.problem.without(proof.chosen, effect.effect.id)
-    silent = Preferring(held, proof.chosen.mount, -1e6)  # nats say nothing for the name
-    tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
-
-    def takes(name: str) -> tuple[bool, float]:
-        term = tried[name]
-        whole, _ = allowed(comparison, beside, (term,))
-        removed = held.plain_gains(proof.chosen.mount, whole)
-        return _held(comparison, Nameless(proof), _Challenge((effect,), term, 1e3, beside), silent)[0], min(removed)
-
-    able, removed = takes("torque and position")
-    assert able
-    assert removed > 0
-    able, removed = takes("speed and position")
-    assert not able
-    assert removed < -POLICY.slight
+    silent = Preferring(motor.held, motor.proof.chosen.mount, -1e6)  # nats say nothing for the name
+    term = motor.terms[name]
+    asked = _Challenge((motor.effect,), term, 1e3, motor.beside)
+    assert _held(motor.comparison, Nameless(motor.proof), asked, silent)[0] is takes
+    grown, _ = allowed(motor.comparison, motor.beside, (term,))
+    removed = min(motor.held.plain_gains(motor.proof.chosen.mount, grown))
+    assert removed > 0 if takes else removed < -POLICY.slight
 
 
-def test_what_took_a_name_stands_beside_every_rival_of_the_next(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
-) -> None:
+def test_what_took_a_name_stands_beside_every_rival_of_the_next(motor: Any) -> None:
     """Also where it is the next effect itself in another form: else the rest would be the next one's to explain."""
-    comparison, _, proof, _ = rippling_motor[1]
-    (effect,) = proof.standing
-    tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
+    proof, effect, tried = motor.proof, motor.effect, list(motor.terms.values())
     barred = hypothesis_of(effect.effect).tables
     own = next(one for one in tried if one.name in barred)
-    beside = Nameless(proof, ((effect, own),))
     alone, both = (
-        _challenge(comparison, found, (effect,), 0.0, _Offered(tried, [])) for found in (Nameless(proof), beside)
+        _challenge(motor.comparison, found, (effect,), 0.0, _Offered(tried, []))
+        for found in (Nameless(proof), Nameless(proof, ((effect, own),)))
     )
     assert both.lead > alone.lead
     assert both.term.name not in (own.name, *barred)
 
 
-def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(
-    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
-) -> None:
-    comparison, _, proof, _ = rippling_motor[1]
-    (effect,) = proof.standing
-    tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
-    leads = [_challenge(comparison, Nameless(proof), (effect,), own, _Offered(tried, [])).lead for own in (-1e9, -2e9)]
-    assert leads[0] == leads[1] < 1e6
-    others = [one for one in tried if one.name not in hypothesis_of(effect.effect).tables]
-    assert _challenge(comparison, Nameless(proof), (effect,), -1e9, _Offered(others, [])).lead > 0.9e9
-    (own_alone,) = [one for one in tried if one.name in hypothesis_of(effect.effect).tables][:1]
-    none = _challenge(comparison, Nameless(proof), (effect,), -1e9, _Offered([own_alone], []))
-    assert (none.lead, none.term) == (-np.inf, own_alone), "nothing else is there to take the name"
+def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(motor: Any) -> None:
+    tables, terms = hypothesis_of(motor.effect.effect).tables, motor.terms.values()
+    own, others = ([one for one in terms if (one.name in tables) is is_own] for is_own in (True, False))
+
+    def challenge(shape: float, offered: Iterable[Any]) -> _Challenge:
+        return _challenge(motor.comparison, Nameless(motor.proof), (motor.effect,), shape, _Offered(list(offered), []))
+
+    assert challenge(-1e9, terms).lead == challenge(-2e9, terms).lead < 1e6
+    assert challenge(-1e9, others).lead > 0.9e9
+    none = challenge(-1e9, own[:1])
+    assert (none.lead, none.term) == (-np.inf, own[0]), "nothing else is there to take the name"
 
 
 def test_what_takes_a_name_is_unknown_whatever_is_left_beside_it() -> None:
@@ -203,27 +180,28 @@ def share(rest: Array, *, scale: float = 1.0, weight: Array | None = None) -> fl
     return burst_share(comparing(np.ones(len(rest)), scale, weight), found)
 
 
-def test_noise_of_one_size_has_none_whatever_its_colour_and_size() -> None:
-    coloured = np.convolve(noise(), np.ones(20) / np.sqrt(20), "same")
-    assert share(noise()) == 0
-    assert share(noise(50.0), scale=50.0) == 0
-    assert share(coloured) < 0.02
+@pytest.mark.parametrize(
+    ("rest", "scale", "most"),
+    [
+        pytest.param(noise(), 1.0, 0.0, id="noise of one size"),
+        pytest.param(noise(50.0), 50.0, 0.0, id="large noise of one size"),
+        pytest.param(np.convolve(noise(), np.ones(20) / np.sqrt(20), "same"), 1.0, 0.02, id="noise of another colour"),
+        pytest.param(noise(np.where((T >= 10) & (T < 11), 30.0, 1.0)), 1.0, 0.0, id="a jolt: one window stands out"),
+        pytest.param(noise() + 20 * np.sin(2 * np.pi * T / 40), 1.0, 0.1, id="what wanders slowly"),
+    ],
+)
+def test_no_burst_is(rest: Array, scale: float, most: float) -> None:
+    assert share(rest, scale=scale) <= most
+
+
+LOUD = noise(np.where((T > 10) & (T < 14), 10.0, 1.0))
 
 
 def test_noise_that_is_larger_for_some_seconds_comes_in_bursts() -> None:
-    loud = noise(np.where((T > 10) & (T < 14), 10.0, 1.0))
     energy = 4 * 100.0  # of 476 in all, each window of it less three of the usual
-    assert share(loud) == pytest.approx((energy - 4 * ABOVE) / (energy + 76), rel=0.05)
-    assert share(loud) > POLICY.small
-    assert share(np.where(T < 30, loud, noise(seed=3))) == pytest.approx(share(loud), rel=0.02)
-
-
-def test_a_single_window_that_stands_out_is_a_jolt() -> None:
-    assert share(noise(np.where((T >= 10) & (T < 11), 30.0, 1.0))) == 0
-
-
-def test_what_wanders_slowly_is_no_burst() -> None:
-    assert share(noise() + 20 * np.sin(2 * np.pi * T / 40)) < 0.1
+    assert share(LOUD) == pytest.approx((energy - 4 * ABOVE) / (energy + 76), rel=0.05)
+    assert share(LOUD) > POLICY.small
+    assert share(np.where(T < 30, LOUD, noise(seed=3))) == pytest.approx(share(LOUD), rel=0.02)
 
 
 def test_what_goes_with_the_motion_is_no_burst() -> None:
@@ -234,11 +212,10 @@ def test_what_goes_with_the_motion_is_no_burst() -> None:
 
 
 def test_only_clear_motion_that_has_weight_counts() -> None:
-    loud = noise(np.where((T > 10) & (T < 14), 10.0, 1.0))
-    weight = np.ones(2 * len(loud))
-    weight[: len(loud)][(T > 9) & (T < 15)] = 0
-    assert share(loud, weight=weight) == 0
-    found: Any = SimpleNamespace(residual=np.concatenate([loud, noise(seed=2)]))
+    weight = np.ones(2 * len(LOUD))
+    weight[: len(LOUD)][(T > 9) & (T < 15)] = 0
+    assert share(LOUD, weight=weight) == 0
+    found: Any = SimpleNamespace(residual=np.concatenate([LOUD, noise(seed=2)]))
     still = np.where((T > 9) & (T < 15), 1e-6, 1.0)
     assert burst_share(comparing(still), found) == 0
 

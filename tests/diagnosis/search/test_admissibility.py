@@ -1,7 +1,8 @@
 """When a fitted effect is none: on motions of which every number is known."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from motions import Array, Motion
 from scipy.signal import lfilter
+from wandering import posed
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
@@ -31,49 +33,37 @@ from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
+EFFECT: Any = SimpleNamespace(broken_rule=lambda: "")
+BROKEN: Any = SimpleNamespace(broken_rule=lambda: "a rule")
+Declared = Callable[..., None]
 
-class Hypothesis:
-    """What an effect declares, as a table."""
 
-    sizes = ()
-    may_end = ()
+@pytest.fixture
+def declared(monkeypatch: pytest.MonkeyPatch) -> Declared:
+    """What the hypothesis of an effect declares, as a table."""
 
-    def __init__(
-        self,
+    def declare(
         plausible: bool = True,
         shown: bool = True,
         degenerate: bool = False,
         back: float = 0.0,
         timing: bool = True,
+        at_bound: bool = False,
     ) -> None:
-        self.plausible, self.shown, self.degenerate = plausible, shown, degenerate
-        self.back, self.is_timing = back, timing
+        said = {"is_plausible": plausible, "shows": shown, "is_degenerate": degenerate, "way_back": back}
+        asked = {name: lambda *_, answer=answer: answer for name, answer in said.items()}
+        hypothesis = SimpleNamespace(sizes=(), may_end=(), is_timing=timing, **asked)
+        monkeypatch.setattr(admissibility, "hypothesis_of", lambda _: hypothesis)
+        monkeypatch.setattr(admissibility, "at_bound", lambda *_: at_bound)
+        monkeypatch.setattr(admissibility, "recorded_by", lambda _: None)
 
-    def is_plausible(self, effect: object, mount: object) -> bool:
-        return self.plausible
-
-    def shows(self, effect: object, mount: object, prepared: object) -> bool:
-        return self.shown
-
-    def is_degenerate(self, problem: object, effect: object) -> bool:
-        return self.degenerate
-
-    def way_back(self, effect: object, mount: object) -> float:
-        return self.back
+    return declare
 
 
-@dataclass(frozen=True)
-class Effect:
-    broken: str = ""
-
-    def broken_rule(self) -> str:
-        return self.broken
-
-
-def asked(monkeypatch: pytest.MonkeyPatch, at_bound: bool = False, **said: Any) -> None:
-    monkeypatch.setattr(admissibility, "hypothesis_of", lambda effect: Hypothesis(**said))
-    monkeypatch.setattr(admissibility, "at_bound", lambda *_: at_bound)
-    monkeypatch.setattr(admissibility, "recorded_by", lambda pieces: None)
+def replace_at(values: Array, place: int, value: float) -> Array:
+    changed = values.copy()
+    changed[place] = value
+    return changed
 
 
 def to_and_fro(*reach: float) -> Motion:
@@ -84,83 +74,69 @@ def to_and_fro(*reach: float) -> Motion:
 
 @pytest.mark.parametrize(("back", "needed"), [(0.29, False), (0.3, False), (0.31, True)])
 def test_friction_is_told_by_the_longest_way_back_of_any_recording(
-    back: float, needed: bool, monkeypatch: pytest.MonkeyPatch
+    back: float, needed: bool, declared: Declared
 ) -> None:
-    asked(monkeypatch, back=back)
-    for motion in (to_and_fro(0.3, 0.1), to_and_fro(0.1, 0.3)):
-        assert needs_turns(Effect(), None, motion) is needed  # type: ignore[arg-type]
+    declared(back=back)
     down = Motion({"v": [np.ones(6)], "q": [-one for one in to_and_fro(0.3).columns["q"]]})
-    assert needs_turns(Effect(), None, down) is needed, "whichever way it goes first"  # type: ignore[arg-type]
+    for motion in (to_and_fro(0.3, 0.1), to_and_fro(0.1, 0.3), down):
+        assert needs_turns(EFFECT, None, motion) is needed  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
     ("effect", "said", "degenerate", "admissible"),
     [
-        (Effect(), {}, False, True),
-        (Effect("a rule"), {}, True, False),
-        (Effect(), {"at_bound": True}, True, False),
-        (Effect(), {"degenerate": True}, True, False),
-        (Effect(), {"plausible": False}, False, False),
-        (Effect(), {"shown": False}, False, False),
-        (Effect(), {"back": 0.5}, False, False),
+        (EFFECT, {}, False, True),
+        (BROKEN, {}, True, False),
+        (EFFECT, {"at_bound": True}, True, False),
+        (EFFECT, {"degenerate": True}, True, False),
+        (EFFECT, {"plausible": False}, False, False),
+        (EFFECT, {"shown": False}, False, False),
+        (EFFECT, {"back": 0.5}, False, False),
     ],
 )
 def test_an_effect_is_admissible_if_nothing_speaks_against_it(
-    effect: Effect, said: dict[str, Any], degenerate: bool, admissible: bool, monkeypatch: pytest.MonkeyPatch
+    effect: Any, said: dict[str, Any], degenerate: bool, admissible: bool, declared: Declared
 ) -> None:
-    asked(monkeypatch, **said)
+    declared(**said)
     problem: Any = SimpleNamespace(prepared=to_and_fro(0.3))
     one: Any = SimpleNamespace(effect=effect, fit=SimpleNamespace(mount=SimpleNamespace(motion="rotary")))
-    assert is_degenerate(problem, effect) is degenerate  # type: ignore[arg-type]
+    assert is_degenerate(problem, effect) is degenerate
     assert all_pass(name_rules(problem, one)) is admissible
 
 
-def timed(residual: Array, torque: Array, **more: Any) -> bool:
-    motion = Motion({"v": [np.ones(4), np.ones(4)], "tau": [torque[:4], torque[4:]]}, **more)
-    problem: Any = SimpleNamespace(prepared=motion, weight=np.ones(8))
-    return in_time(problem, SimpleNamespace(effect=Effect(), fit=SimpleNamespace(residual=residual)))  # type: ignore[arg-type]
+STEPS = np.array([0.0, 2.0, 0.0, 2.0, 100.0, 102.0, 100.0, 102.0])
+WILD = np.concatenate([STEPS[:4] * 0.1, STEPS[4:] * 5 + 1e6])
+ONE_ROW = replace_at(0.1 * STEPS, 2, 1e3)
 
 
-def test_timing_is_told_where_half_of_the_torques_changes_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked(monkeypatch)
-    torque = np.array([0.0, 2.0, 0.0, 2.0, 100.0, 102.0, 100.0, 102.0])
-    assert timed(torque * 0.7, torque), "0.49 of the energy is left"
-    assert not timed(torque * 0.71, torque), "0.504 of the energy is left"
-    assert not timed(torque * np.repeat([1.0, 0.0], 4), torque), "exactly half"
-    wild = np.concatenate([torque[:4] * 0.1, torque[4:] * 5 + 1e6])
-    assert not timed(wild, torque)
-    assert timed(wild, torque, asked=[True, False]), "nothing is asked in the second recording"
-    asked(monkeypatch, timing=False)
-    assert timed(torque * 9, torque), "no effect of timing"
-
-
-def test_rows_without_weight_and_the_step_between_recordings_tell_nothing_of_timing(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("residual", "more", "told"),
+    [
+        pytest.param(STEPS * 0.7, {}, True, id="0.49 of the energy of its changes is left"),
+        pytest.param(STEPS * 0.71, {}, False, id="0.504 of it"),
+        pytest.param(STEPS * np.repeat([1.0, 0.0], 4), {}, False, id="exactly half"),
+        pytest.param(0.1 * STEPS + np.repeat([0.0, 1e3], 4), {}, True, id="the step between recordings is no change"),
+        pytest.param(WILD, {}, False, id="more in the second recording"),
+        pytest.param(WILD, {"asked": [True, False]}, True, id="nothing is asked in the second recording"),
+        pytest.param(STEPS * 9, {"timing": False}, True, id="no effect of timing"),
+        pytest.param(ONE_ROW, {}, False, id="all in one row"),
+        pytest.param(ONE_ROW, {"weight": replace_at(np.ones(8), 2, 0.0)}, True, id="in a row without weight"),
+    ],
+)
+def test_timing_is_told_where_half_of_the_torques_changes_are_explained(
+    residual: Array, more: dict[str, Any], told: bool, declared: Declared
 ) -> None:
-    asked(monkeypatch)
-    torque = np.array([0.0, 2.0, 0.0, 2.0, 0.0, 2.0, 0.0, 2.0])
-    rest = 0.1 * torque + np.repeat([0.0, 1e3], 4)
-    assert timed(rest, torque), "the jump from one recording to the next is no change"
-    rest = replace_at(0.1 * torque, 2, 1e3)
-    motion = Motion({"v": [np.ones(8)], "tau": [torque]})
-    one: Any = SimpleNamespace(effect=Effect(), fit=SimpleNamespace(residual=rest))
-    whole, without = (
-        SimpleNamespace(prepared=motion, weight=weight) for weight in (np.ones(8), replace_at(np.ones(8), 2, 0.0))
-    )
-    assert not in_time(whole, one)  # type: ignore[arg-type]
-    assert in_time(without, one)  # type: ignore[arg-type]
-
-
-def replace_at(values: Array, place: int, value: float) -> Array:
-    changed = values.copy()
-    changed[place] = value
-    return changed
+    declared(timing=more.get("timing", True))
+    motion = Motion({"v": [np.ones(4)] * 2, "tau": [STEPS[:4], STEPS[4:]]}, more.get("asked", []))
+    problem: Any = SimpleNamespace(prepared=motion, weight=more.get("weight", np.ones(8)))
+    one: Any = SimpleNamespace(effect=EFFECT, fit=SimpleNamespace(residual=residual))
+    assert in_time(problem, one) is told
 
 
 # A spring must be asked for by the set point, and what is late must be late away from turns too.
 
 J, DT, SECONDS = 2.0, 2e-3, 60.0
-MOUNT = Mount(name="axis", axis=Axis(inertia=J), friction=Coulomb(Fc=0.5, sigma2=0.5), effects=())
+MOUNT = Mount(name="axis", axis=Axis(inertia=J), friction=Coulomb(Fc=0.5, sigma2=0.5))
 SPRING = LoadSideCompliance(resonance_hz=12.0, encoder_share=0.5)
 
 
@@ -190,48 +166,34 @@ def recordings(noise: float, asked: float, spring: bool) -> list[Recording]:
     return out
 
 
-def asked_for(noise: float, asked: float, spring: bool, *, with_set_point: bool = True) -> bool:
-    made = recordings(noise, asked, spring)
-    if not with_set_point:
-        made = [Recording(one.name, {n: one.table[n] for n in ("t", "q", "tau")}) for one in made]
-    prepared = prepare(made, 8.0)
-    problem = Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), DT)
+@pytest.mark.parametrize(
+    ("noise", "asked", "spring", "columns", "told"),
+    [
+        pytest.param(0.0, 2.0, True, ("t", "q", "q_d", "tau"), True, id="a spring that the set point moves"),
+        pytest.param(0.5, 2.0, True, ("t", "q", "q_d", "tau"), True, id="beside noise"),
+        pytest.param(5.0, 0.0, False, ("t", "q", "q_d", "tau"), False, id="a loop that answers noise"),
+        pytest.param(5.0, 0.0, False, ("t", "q", "tau"), True, id="without a set point nobody can be asked"),
+    ],
+)
+def test_a_spring_is_asked_for_by_the_set_point(
+    noise: float, asked: float, spring: bool, columns: tuple[str, ...], told: bool
+) -> None:
+    made = [Recording(one.name, {n: one.table[n] for n in columns}) for one in recordings(noise, asked, spring)]
+    problem = posed(MOUNT, made, 8.0)
     base = problem.fit(MOUNT, 25)
     found = problem.fit(replace(base.mount, effects=(SPRING,)), 15)
-    return is_asked_for(Comparison.of(problem, base, POLICY), found, found.mount.effects[-1])
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.5])
-def test_a_spring_that_the_set_point_moves_is_asked_for(noise: float) -> None:
-    assert asked_for(noise, 2.0, True)
-
-
-def test_a_loop_that_answers_noise_is_no_spring() -> None:
-    assert not asked_for(5.0, 0.0, False)
-    assert asked_for(5.0, 0.0, False, with_set_point=False), "without a set point nobody can be asked"
-
-
-def swung(left: Any) -> tuple[Problem, Any, Any]:
-    """Rows of a motion that turns every 5 s, what is left of them with an effect (`left` of the time), and without."""
-    t = np.arange(0, SECONDS, DT)
-    recording = Recording("run", {"t": t, "q": np.sin(2 * np.pi * 0.1 * t), "tau": np.zeros_like(t)})
-    prepared = prepare([recording], 8.0)
-    when = prepared.stacked("t")
-    problem = Problem(MOUNT, prepared, np.ones(len(when)), DT)
-    return problem, left(when), np.ones(len(when))
-
-
-def turning(t: Any) -> Any:
-    """0 for 60 ms after each turn, 1 elsewhere: all that is removed is removed there."""
-    return np.where((t - 2.5) % 5.0 < 0.06, 0.0, 1.0)
+    assert is_asked_for(Comparison.of(problem, base, POLICY), found, found.mount.effects[-1]) is told
 
 
 def test_where_something_removes_energy() -> None:
-    problem, left, without = swung(turning)
-    assert away_from_turns(problem, left, without) == 1.0  # a hundredth of the energy says nothing
-    loud = np.where(turning(problem.prepared.stacked("t")) == 0.0, 5.0, 1.0)
-    assert away_from_turns(problem, left, loud) == pytest.approx(0.0, abs=1e-12)
-    assert away_from_turns(problem, 0 * left, without) == pytest.approx(0.94, abs=0.03)
+    """Of a motion that turns every 5 s, from each turn on for 60 ms."""
+    t = np.arange(0, SECONDS, DT)
+    swung = Recording("run", {"t": t, "q": np.sin(2 * np.pi * 0.1 * t), "tau": np.zeros_like(t)})
+    problem = posed(MOUNT, [swung], 8.0)
+    left = np.where((problem.prepared.stacked("t") - 2.5) % 5.0 < 0.06, 0.0, 1.0)
+    assert away_from_turns(problem, left, np.ones(len(left))) == 1.0  # a hundredth of the energy says nothing
+    assert away_from_turns(problem, left, np.where(left == 0, 5.0, 1.0)) == pytest.approx(0.0, abs=1e-12)
+    assert away_from_turns(problem, 0 * left, np.ones(len(left))) == pytest.approx(0.94, abs=0.03)
 
 
 def test_what_is_late_about_turns_alone_is_not_named() -> None:
@@ -246,8 +208,7 @@ def test_what_is_late_about_turns_alone_is_not_named() -> None:
         tau = 0.01 * a + 0.5 * v + 2 * ahead + noise
         made.append(Recording(f"run_{seed}", {"t": t, "q": np.cumsum(v) * DT, "tau": tau}))
     mount = replace(MOUNT, axis=Axis(inertia=0.01), friction=Coulomb(Fc=2.0, sigma2=0.5))
-    prepared = prepare(made, 8.0)
-    problem = Problem(mount, prepared, np.ones(len(prepared.recording_of)), DT)
+    problem = posed(mount, made, 8.0)
     base = problem.fit(problem.mount, 25)
     comparison = Comparison.of(problem, base, POLICY)
     found = problem.fit(replace(base.mount, effects=(Delay(delay_ms=5.0),)), 15)
@@ -261,7 +222,7 @@ def test_what_is_late_about_turns_alone_is_not_named() -> None:
 # A contact that bends says what is held at rest and must be right; one that settles rises by less than itself.
 
 FC, SIGMA0 = 2.0, 400.0
-PLAIN = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+PLAIN = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0))
 
 
 def recording(seed: int, bends: bool) -> Recording:
@@ -289,29 +250,26 @@ def comparison(bends: bool) -> tuple[Comparison, Fit]:
     return Comparison.of(problem, base, POLICY), base
 
 
-def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest() -> None:
-    for bends in (True, False):
-        whole, base = comparison(bends)
-        found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
-        assert (found.at_rest > POLICY.half) is bends
-        assert all_pass(admission(whole, found)) is bends
+BENT = replace(PLAIN, effects=(Presliding(sigma0=SIGMA0),))
 
 
-def test_held_out_too() -> None:
+@pytest.mark.parametrize("bends", [True, False])
+def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest(bends: bool) -> None:
+    whole, base = comparison(bends)
+    found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
+    assert (found.at_rest > POLICY.half) is bends
+    assert all_pass(admission(whole, found)) is bends
+
+
+def test_a_contact_alone_gives_memory_which_is_judged_held_out_too() -> None:
     whole, base = comparison(True)
     there = prepare([recording(3, True)], 30.0)
     held = Predictive.of(whole, there, base, there)
-    bent = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(Presliding(sigma0=SIGMA0),))
-    pushed = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(TorqueOffset(torque=0.1),))
-    assert held.at_rest(PLAIN, bent) > 0.9
-    assert held.at_rest(PLAIN, pushed) == held.at_rest(bent, bent) == 0.0
-
-
-def test_memory_is_got_from_a_contact_and_from_nothing_else() -> None:
-    bent = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(Presliding(sigma0=SIGMA0),))
-    assert gets_memory(bent, PLAIN)
-    assert not gets_memory(bent, bent)
-    assert not gets_memory(PLAIN, bent)
+    assert held.at_rest(PLAIN, BENT) > 0.9
+    assert held.at_rest(PLAIN, replace(PLAIN, effects=(TorqueOffset(torque=0.1),))) == held.at_rest(BENT, BENT) == 0.0
+    assert gets_memory(BENT, PLAIN)
+    assert not gets_memory(BENT, BENT)
+    assert not gets_memory(PLAIN, BENT)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,26 @@
-"""The size of an effect is told by its 95 % range, and never at a bound."""
+"""The size of an effect is told by its 95 % range, and never at a bound, nor where the effect is really another."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from wandering import posed
 
+from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.tuning import ANY, at_bound
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.bounds import not_found
+from cosim.diagnosis.search.admissibility import in_time, is_degenerate
 from cosim.diagnosis.search.sizes import Numbers, is_told, numbers_of
-from pyfmi_models.effects import Cogging, Delay, Effect, FrictionAsymmetry, StribeckEffect, TorqueOffset
+from cosim.diagnosis.search.stages import CandidateFit
+from cosim.estimation.fit import Fit
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, FrictionAsymmetry, StribeckEffect, TorqueOffset
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.model import Recorded, parameters_of
@@ -15,6 +28,8 @@ from pyfmi_models.mount import Axis, Mount
 
 MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
 VISITED = Recorded(speed=2.0, torque=9.0)
+LONGEST = {one.name: one for one in parameters_of(Delay(delay_ms=1.0))}["delay_ms"].high
+MIDDLE = Delay(delay_ms=0.5 * LONGEST)
 
 
 @pytest.mark.parametrize(
@@ -39,49 +54,45 @@ def test_a_size_is_told_by_a_range_without_none_and_away_from_bounds(
     assert is_told(effect, numbers, MOUNT, VISITED) is told
 
 
-# What a range, a bound or the wrong sign takes from a name: nothing is found whose size the recordings do not tell.
-
-BARE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=3.0))
-
-
-def told(effect: Effect, **errors: float) -> bool:
+@pytest.mark.parametrize(
+    ("effect", "errors", "told"),
+    [
+        pytest.param(TorqueOffset(torque=1.0), {"torque": 1 / 1.97}, True, id="none lies beyond the 95 % range"),
+        pytest.param(TorqueOffset(torque=1.0), {"torque": 1 / 1.95}, False, id="none lies in it"),
+        pytest.param(TorqueOffset(torque=-1.0), {"torque": 1 / 1.97}, True, id="a negative one is as good"),
+        pytest.param(TorqueOffset(torque=-1.0), {"torque": 1 / 1.95}, False, id="negative, and none in its range"),
+        pytest.param(Delay(delay_ms=LONGEST), {"delay_ms": 0.01 * LONGEST}, False, id="at a bound"),
+        pytest.param(Delay(delay_ms=0.999 * LONGEST), {"delay_ms": 0.01 * LONGEST}, True, id="near a bound"),
+        pytest.param(MIDDLE, {"delay_ms": 0.2 * LONGEST}, True, id="a range that holds much of what it may be"),
+        pytest.param(MIDDLE, {"delay_ms": 0.3 * LONGEST}, False, id="a range that holds all that it may be"),
+        pytest.param(Cogging(amplitude=0.1, cycles_per_rev=20.0), {}, True, id="what was not fitted says nothing"),
+    ],
+)
+def test_a_range_that_holds_nothing_at_all_or_all_tells_no_size(
+    effect: Effect, errors: dict[str, float], told: bool
+) -> None:
     values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
-    return is_told(effect, Numbers(values, errors), replace(BARE, effects=(effect,)), ANY)
+    assert is_told(effect, Numbers(values, errors), replace(MOUNT, effects=(effect,)), ANY) is told
 
 
-def test_a_range_that_holds_nothing_at_all_tells_no_size() -> None:
-    offset = TorqueOffset(torque=1.0)
-    assert told(offset, torque=1 / 1.97)
-    assert not told(offset, torque=1 / 1.95), "none lies in the 95 % range"
-    assert told(replace(offset, torque=-1.0), torque=1 / 1.97), "a negative one is as good"
-    assert not told(replace(offset, torque=-1.0), torque=1 / 1.95)
+def test_a_fit_ends_at_a_bound_a_little_inside() -> None:
+    assert at_bound(Delay(delay_ms=LONGEST))
+    assert at_bound(Delay(delay_ms=LONGEST * (1 - 2e-9))), "a fit goes on from 1e-9 of its scale inside"
+    assert not at_bound(Delay(delay_ms=0.999 * LONGEST))
 
 
-def test_at_a_bound_no_size_is_told() -> None:
-    known = {variable.name: variable for variable in parameters_of(Delay(delay_ms=1.0))}["delay_ms"]
-    assert at_bound(Delay(delay_ms=known.high))
-    assert at_bound(Delay(delay_ms=known.high * (1 - 2e-9))), "a fit goes on from 1e-9 of its scale inside"
-    assert not at_bound(Delay(delay_ms=0.999 * known.high))
-    assert not told(Delay(delay_ms=known.high), delay_ms=0.01 * known.high)
-    assert told(Delay(delay_ms=0.999 * known.high), delay_ms=0.01 * known.high)
-
-
-def test_of_several_sizes_one_inside_its_range_is_no_bound() -> None:
+@pytest.mark.parametrize("edge", [0.95, -0.95])
+def test_of_several_sizes_one_inside_its_range_is_no_bound(edge: float) -> None:
     """Another generator's friction of two directions has a viscous part beyond what a card may hold."""
     sizes = hypothesis_of(FrictionAsymmetry(level_asymmetry=0.1)).sizes
-    for edge in (0.95, -0.95):
-        assert not at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge), sizes)
-        assert at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge))
-        assert at_bound(FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=edge), sizes), "nothing is no size"
-        assert at_bound(FrictionAsymmetry(level_asymmetry=edge, viscous_asymmetry=-edge), sizes)
-
-
-def test_a_number_that_was_not_fitted_says_nothing_of_itself() -> None:
-    assert told(Cogging(amplitude=0.1, cycles_per_rev=20.0))
+    assert not at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge), sizes)
+    assert at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge))
+    assert at_bound(FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=edge), sizes), "nothing is no size"
+    assert at_bound(FrictionAsymmetry(level_asymmetry=edge, viscous_asymmetry=-edge), sizes)
 
 
 def test_errors_go_to_the_numbers_of_their_own_effect() -> None:
-    mount = replace(BARE, effects=(TorqueOffset(torque=1.0), Delay(delay_ms=2.0)))
+    mount = replace(MOUNT, effects=(TorqueOffset(torque=1.0), Delay(delay_ms=2.0)))
     names = {part: name for name, part in mount.components().items() if isinstance(part, Effect)}
     errors = {f"{names[mount.effects[0]]}.torque": 0.1, f"{names[mount.effects[1]]}.delay_ms": 0.2}
     assert numbers_of(mount.effects[1], mount, errors).errors == {"delay_ms": 0.2}
@@ -90,11 +101,83 @@ def test_errors_go_to_the_numbers_of_their_own_effect() -> None:
 @pytest.mark.parametrize(("level", "plausible"), [(2.1, True), (2.0, False), (1.5, False)])
 def test_a_stribeck_curve_falls_from_a_break_away_above_the_level(level: float, plausible: bool) -> None:
     curve = StribeckEffect(Fs=level, Vs=0.1)
-    assert hypothesis_of(curve).is_plausible(curve, BARE) is plausible
+    assert hypothesis_of(curve).is_plausible(curve, MOUNT) is plausible
 
 
-def test_a_range_that_holds_all_that_it_may_be_tells_no_size() -> None:
-    known = {variable.name: variable for variable in parameters_of(Delay(delay_ms=1.0))}["delay_ms"]
-    middle = 0.5 * (known.low + known.high)
-    assert told(Delay(delay_ms=middle), delay_ms=0.2 * known.high)
-    assert not told(Delay(delay_ms=middle), delay_ms=0.3 * known.high)
+# What an effect that is really another is called.
+
+LIGHT = replace(MOUNT, friction=Coulomb(Fc=1.0))
+
+
+def problem(speed: np.ndarray, **columns: np.ndarray) -> Problem:
+    """Of one recording at 1 kHz."""
+    t = np.arange(len(speed)) / 1000
+    return posed(LIGHT, [Recording("r", {"t": t, "tau": speed, "q": np.cumsum(speed) / 1000, **columns})], 10.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "degenerate"),
+    [
+        # A value that is held, or stamped at the other end of its row, is half a sample late: so it was read.
+        *((form(**{name: 0.51}), True) for form, name in ((Delay, "delay_ms"), (ActuatorLag, "time_constant_ms"))),
+        *((form(**{name: 0.57}), False) for form, name in ((Delay, "delay_ms"), (ActuatorLag, "time_constant_ms"))),
+        (Compliance(antiresonance_hz=30.0, resonance_hz=20.0), True),  # no card may hold it
+        (Compliance(antiresonance_hz=20.0, resonance_hz=30.0), False),
+        # A cable whose home is far beside the travel, here from 0 to 2 rad, pulls one way all along, as a weight does.
+        (CableWrap(stiffness=0.1, home=-0.45), False),
+        (CableWrap(stiffness=0.1, home=-0.55), True),
+        (CableWrap(stiffness=0.1, home=2.55), True),
+    ],
+    ids=str,
+)
+def test_what_is_really_something_else_is_no_answer(effect: Effect, degenerate: bool) -> None:
+    assert is_degenerate(problem(np.sin(np.arange(20_000) / 1000)), effect) is degenerate
+
+
+@pytest.mark.parametrize(("more", "told"), [({}, False), ({"q_d": np.arange(20_000) / 1000}, True)])
+def test_noise_at_constant_speed_tells_no_delay_unless_a_set_point_asks_for_it(
+    more: dict[str, np.ndarray], told: bool
+) -> None:
+    found = problem(1 + 0.02 * np.random.default_rng(1).standard_normal(20_000), **more)
+    none = np.zeros(0)
+    fit = Fit(LIGHT, (), none, none, none, np.zeros(len(found.prepared.recording_of)))
+    assert in_time(found, CandidateFit(Delay(delay_ms=5.0), fit, 50.0, 0.0, 0.5)) is told
+
+
+def tuned(this: Problem, rough: Effect) -> Effect:
+    """What a hypothesis makes of an effect that was fitted from a rough start."""
+    mount = replace(LIGHT, effects=(rough,))
+    found: Callable[..., Fit] = hypothesis_of(rough).tuned
+    return found(this, this.fit(mount, 12), rough, lambda fit: -this.error(fit)).mount.effects[-1]
+
+
+def test_how_a_cable_hardens_is_fitted_as_its_grid_knows_it_only_roughly() -> None:
+    t = np.arange(40_000) / 1000
+    q, v = 1.5 * np.sin(0.9 * t), 1.35 * np.cos(0.9 * t)
+    tau = -0.81 * 5 * q + np.sign(v) + 2 * (q - 0.2) * (1 + 0.3 * (q - 0.2) ** 2)
+    found = tuned(problem(v, tau=tau, q=q), CableWrap(stiffness=1.0, home=0.0, hardening=4 / 9))
+    assert isinstance(found, CableWrap)
+    assert (found.hardening, found.home) == (pytest.approx(0.3, rel=0.05), pytest.approx(0.2, rel=0.05))
+
+
+def test_a_stribeck_curve_is_found_from_a_start_narrower_than_the_gap_between_the_speeds() -> None:
+    t = np.arange(300) / 100
+    runs = []
+    for v in (side * v for v in (0.1, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0) for side in (1, -1)):
+        tau = np.full(300, np.sign(v) * (1 + 0.2 * np.exp(-abs(v) / 5)) + 0.02 * v)
+        runs.append(Recording(f"at {v}", {"t": t, "q": v * t, "tau": tau}))
+    found = tuned(posed(LIGHT, runs, 10.0), StribeckEffect(Fs=1.2, Vs=0.1))
+    assert isinstance(found, StribeckEffect)
+    assert (found.Vs, found.Fs) == (pytest.approx(5, rel=0.01), pytest.approx(1.2, rel=0.01))
+
+
+def test_of_an_asymmetry_that_looks_like_the_offset_found_it_is_said_that_it_does() -> None:
+    t = np.arange(0, 20, 0.01)
+    v = np.cos(2 * t) + 0.5 * np.cos(0.7 * t)
+    q = np.sin(2 * t) / 2 + np.sin(0.7 * t) / 1.4
+    this = posed(LIGHT, [Recording("r", {"t": t, "q": q, "tau": np.sign(v) + 0.2 + 5 * np.gradient(v, t)})], 10.0)
+    found = this.fit(replace(LIGHT, effects=(TorqueOffset(torque=1.0),)), 5)
+    comparison = Comparison.of(this, this.fit(LIGHT, 5), POLICY)
+    absent = {finding.effect: finding for finding in not_found(comparison, found, ["torque_offset"], 0.0)}
+    assert absent["friction_asymmetry"].answer == "not_testable"
+    assert "torque offset" in absent["friction_asymmetry"].evidence
