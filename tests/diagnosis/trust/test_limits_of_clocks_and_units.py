@@ -1,11 +1,11 @@
 """From which lag on two clocks are said and withhold names, and from which factor on a unit is refused."""
 
-from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from wandering import swing
+from wandering import axis, swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
@@ -20,10 +20,6 @@ from cosim.support.units import conversion
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Delay, Effect, TorqueOffset
 from pyfmi_models.effects.clock_skew import ClockSkew
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
-
-MS = 1e-3
 
 
 @pytest.mark.parametrize(
@@ -46,7 +42,7 @@ MS = 1e-3
 def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(
     lag: float, low: float, high: float, late: bool, too_late: bool
 ) -> None:
-    found = ClockOffset(lag * MS, low * MS, high * MS)
+    found = ClockOffset(lag * 1e-3, low * 1e-3, high * 1e-3)
     assert (found.is_late, found.is_too_late) == (late, too_late)
 
 
@@ -82,57 +78,46 @@ def judgement(
 
 
 @pytest.mark.parametrize(
-    ("factor", "probability", "refused"),
+    ("slip", "refused"),
     [
-        (10.1, 0.91, True),
-        (1 / 10.1, 0.91, True),
-        (9.9, 0.99, False),
-        (1 / 9.9, 0.99, False),
-        (57.3, 0.91, True),
-        (57.3, 0.89, False),
-        (1000.0, 0.89, False),
+        ((10.1, 0.91), True),
+        ((1 / 10.1, 0.91), True),
+        ((9.9, 0.99), False),
+        ((1 / 9.9, 0.99), False),
+        ((57.3, 0.91), True),
+        ((57.3, 0.89), False),
+        ((1000.0, 0.89), False),
+        ((1000.0, 0.99, "time_unit", "--units t=ms"), True),
+        ((1000.0, 0.99, "torque_scale", "--units tau=mN.m"), False),
+        ((1000.0, 0.99, "position_scale", ""), False),
     ],
 )
-def test_a_unit_is_refused_where_it_is_wrong_by_more_than_ten_and_surely(
-    factor: float, probability: float, refused: bool
+def test_a_scale_of_position_or_time_is_refused_where_it_is_wrong_by_more_than_ten_surely_and_an_option_puts_it_right(
+    slip: tuple[Any, ...], refused: bool
 ) -> None:
-    one = judgement(factor, probability)
+    kind, option = slip[2:] or ("position_scale", "--units q=x")
     if refused:
-        with pytest.raises(RecordingError, match="Use --units q=x"):
-            stated(one)
+        with pytest.raises(RecordingError, match=f"Use {option}"):
+            stated(judgement(*slip))
     else:
-        assert "--units q=x" in stated(one).statement
+        said = stated(judgement(*slip))
+        assert (said.finding, option in said.statement) == (kind, True)
 
 
 @pytest.mark.parametrize(
-    ("kind", "option", "refused"),
-    [("time_unit", "--units t=ms", True), ("torque_scale", "--units tau=mN.m", False), ("position_scale", "", False)],
+    ("probability", "blocks", "alone", "told"),
+    [
+        pytest.param(0.96, True, True, 2, id="sure: the cause is stated alone"),
+        pytest.param(0.94, True, False, 2, id="not sure"),
+        pytest.param(0.51, True, False, 2, id="a slip that is likelier than not withholds names"),
+        pytest.param(0.49, False, False, 2, id="less likely than not"),
+        pytest.param(0.031, False, True, 2, id="an alternative of three percent is listed"),
+        pytest.param(0.029, False, True, 1, id="none below"),
+    ],
 )
-def test_only_a_scale_of_position_or_time_that_an_option_puts_right_is_refused(
-    kind: str, option: str, refused: bool
-) -> None:
-    one = judgement(1000.0, 0.99, kind, option)
-    if refused:
-        with pytest.raises(RecordingError, match=option):
-            stated(one)
-    else:
-        assert stated(one).finding == kind
-
-
-@pytest.mark.parametrize(("probability", "blocks"), [(0.51, True), (0.49, False)])
-def test_a_slip_that_is_likelier_than_not_withholds_names(probability: float, blocks: bool) -> None:
-    assert stated(judgement(2.0, probability)).blocks_naming is blocks
-
-
-@pytest.mark.parametrize(("probability", "alone"), [(0.96, True), (0.94, False)])
-def test_a_cause_is_stated_alone_only_where_it_is_sure(probability: float, alone: bool) -> None:
-    said = stated(judgement(2.0, probability)).statement
-    assert ("Either" in said) is not alone
-
-
-@pytest.mark.parametrize(("probability", "told"), [(0.031, 2), (0.029, 1)])
-def test_an_alternative_of_three_percent_is_listed_and_none_below(probability: float, told: int) -> None:
-    assert len(stated(judgement(2.0, probability)).alternatives) == told
+def test_a_cause_is_said_by_how_sure_it_is(probability: float, blocks: bool, alone: bool, told: int) -> None:
+    said = stated(judgement(2.0, probability))
+    assert (said.blocks_naming, "Either" not in said.statement, len(said.alternatives)) == (blocks, alone, told)
 
 
 @pytest.mark.parametrize("linear", [False, True])
@@ -168,54 +153,30 @@ def test_a_gear_from_3_to_300_is_tried_before_position_torque_or_both(linear: bo
 
 # A lag between the clocks that the model with its effects denies is not said, and withholds no name.
 
-AXIS = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
 CLOCKS = Sanity(finding="clocks", statement="late", blocks_naming=True)
 SIGN = Sanity(finding="torque_sign", statement="turned", blocks_naming=True)
-
-
-@dataclass
-class Fitted:
-    mount: Mount
-
-
-@dataclass
-class Tried:
-    effect: Effect
-    fit: Fitted
-    evidence: float
-
-
-@dataclass
-class Beside:
-    tried: tuple[Tried, ...]
-
-
-def held(*effects: Effect) -> Fitted:
-    return Fitted(replace(AXIS, effects=effects))
-
-
-def left(chosen: Fitted, *beside: tuple[Effect, float]) -> tuple[Sanity, ...]:
-    tried = tuple(Tried(effect, held(effect), worth) for effect, worth in beside)
-    return without_denied((CLOCKS, SIGN), chosen, Beside(tried))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
     ("chosen", "beside", "stays"),
     [
-        (held(), (), False),
-        (held(TorqueOffset(torque=1.0)), (), False),
-        (held(Delay(delay_ms=20.0)), (), True),
-        (held(Delay(delay_ms=2.0)), (), False),
-        (held(ClockSkew(offset_ms=-20.0, drift_ppm=0.0)), (), True),
-        (held(), ((Delay(delay_ms=20.0), 3.0),), True),
-        (held(), ((Delay(delay_ms=20.0), -1.0),), False),
-        (held(), ((TorqueOffset(torque=20.0), 50.0),), False),
+        ((), (), False),
+        ((TorqueOffset(torque=1.0),), (), False),
+        ((Delay(delay_ms=20.0),), (), True),
+        ((Delay(delay_ms=2.0),), (), False),
+        ((ClockSkew(offset_ms=-20.0, drift_ppm=0.0),), (), True),
+        ((), (Delay(delay_ms=20.0), 3.0), True),
+        ((), (Delay(delay_ms=20.0), -1.0), False),
+        ((), (TorqueOffset(torque=20.0), 50.0), False),
     ],
 )
-def test_a_lag_stays_where_the_model_wants_one(
-    chosen: Fitted, beside: tuple[tuple[Effect, float], ...], stays: bool
-) -> None:
-    assert left(chosen, *beside) == ((CLOCKS, SIGN) if stays else (SIGN,))
+def test_a_lag_stays_where_the_model_wants_one(chosen: tuple[Effect, ...], beside: Any, stays: bool) -> None:
+    def fitted(*effects: Effect) -> Any:
+        return SimpleNamespace(mount=axis(effects=effects))
+
+    tried = [SimpleNamespace(effect=beside[0], fit=fitted(beside[0]), evidence=beside[1])] if beside else []
+    left: Any = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))  # type: ignore[arg-type]
+    assert left == ((CLOCKS, SIGN) if stays else (SIGN,))
 
 
 def test_what_no_model_settles_is_never_left_out() -> None:
