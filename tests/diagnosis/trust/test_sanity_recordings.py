@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from measured_like import read
+from wandering import recorded, swing
 
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
@@ -29,22 +30,12 @@ def changed(**columns: Callable[[np.ndarray], np.ndarray]) -> Change:
     return lambda one: replace(one, table=one.table | {name: change(one[name]) for name, change in columns.items()})
 
 
-def delayed(seconds: float) -> Change:
-    """The position comes so much later."""
+def delayed(seconds: float, column: str = "q") -> Change:
+    """A column, the position if no other is said, comes so much later."""
 
     def change(one: Recording) -> Recording:
         rows = round(seconds / one.sample_time)
-        return changed(q=lambda q: np.concatenate([np.repeat(q[:1], rows), q[:-rows]]))(one)
-
-    return change
-
-
-def late_torque(seconds: float) -> Change:
-    """The torque comes so much later."""
-
-    def change(one: Recording) -> Recording:
-        rows = round(seconds / one.sample_time)
-        return changed(tau=lambda tau: np.concatenate([np.repeat(tau[:1], rows), tau[:-rows]]))(one)
+        return changed(**{column: lambda x: np.concatenate([np.repeat(x[:1], rows), x[: len(x) - rows]])})(one)
 
     return change
 
@@ -136,9 +127,10 @@ class TestGenerated:
     def test_a_torque_beyond_the_limit_of_the_drive_is_in_another_unit(self) -> None:
         card, recordings = generated()
         limit = 2 * max(float(np.abs(one["tau"]).max()) for one in recordings)
-        plain, limited = (Reference(card.mount.inertia, None, torque_limit=one) for one in (np.inf, limit))
-        large = [changed(tau=lambda x: 100 * x)(one) for one in recordings]
-        shares = [_share(Judgement.of(large, one), "N.cm") for one in (plain, limited)]
+        large, shares = [changed(tau=lambda x: 100 * x)(one) for one in recordings], []
+        for most in (np.inf, limit):
+            found = Judgement.of(large, Reference(card.mount.inertia, None, torque_limit=most)).alternatives
+            shares.append(sum(told.likelihood for one, told in found if one.option.endswith("=N.cm")))
         assert shares[1] >= shares[0] > 0.5
 
     def test_a_held_out_recording_of_another_machine_is_said(self) -> None:
@@ -151,24 +143,15 @@ class TestGenerated:
         assert one.statement.startswith("other is held out, and is not of the machine of the training recordings")
         assert not one.blocks_naming
 
-    @pytest.mark.parametrize(
-        ("ms", "late", "blocks"),
-        [
-            (0, False, False),
-            (11, True, False),
-            (30, True, True),
-            (-14, True, False),
-            (-23, True, True),
-        ],
-    )
+    @pytest.mark.parametrize(("ms", "blocks"), [(0, []), (11, [False]), (30, [True]), (-14, [False]), (-23, [True])])
     def test_a_drives_delay_is_let_pass_a_large_one_said_and_a_larger_one_blocks(
-        self, ms: int, late: bool, blocks: bool
+        self, ms: int, blocks: list[bool]
     ) -> None:
         """Where it is negative the torque was shifted instead of the position."""
         _, (*train, _) = generated()
-        change = delayed(ms / 1e3) if ms > 0 else late_torque(-ms / 1e3)
-        found = clocks([Balance([change(one) if ms else one]) for one in train], "both")
-        assert [one.blocks_naming for one in found] == ([blocks] if late else [])
+        change = delayed(abs(ms) / 1e3, "q" if ms > 0 else "tau")
+        found = clocks([Balance([change(one)]) for one in train], "both")
+        assert [one.blocks_naming for one in found] == blocks
         assert all(("later" if ms > 0 else "earlier") in one.statement for one in found)
 
     def test_likelihoods_are_a_distribution_over_what_is_told(self) -> None:
@@ -180,10 +163,6 @@ class TestGenerated:
         assert 0 <= found.right <= 1
 
 
-def _share(found: Judgement, unit: str) -> float:
-    return sum(told.likelihood for one, told in found.alternatives if one.option.endswith(f"={unit}"))
-
-
 def test_a_constant_speed_is_not_doubted() -> None:
     t = np.arange(5000) / 500
     ripple = 1e-3 * np.sin(3 * t)
@@ -193,8 +172,7 @@ def test_a_constant_speed_is_not_doubted() -> None:
 
 def test_a_speed_in_rpm_is_told_where_no_position_is_there() -> None:
     t = np.arange(20_000) / 1000
-    v = 3 * np.sin(1.7 * t) + 2 * np.sin(4.1 * t)
-    a = 3 * 1.7 * np.cos(1.7 * t) + 2 * 4.1 * np.cos(4.1 * t)
+    _, v, a = swing(t, [(3 / 1.7, 1.7, 0.0), (2 / 4.1, 4.1, 0.0)], per=1)
     run = Recording("run", {"t": t, "tau": 0.5 * a + 2 * np.tanh(v / 0.01) + 0.1 * v, "v": v * 30 / np.pi})
     (one,) = judged([run], [], Reference(0.5, 2.0))
     assert one.finding == "position_scale"
@@ -213,43 +191,36 @@ def test_a_unit_that_was_stated_is_not_doubted() -> None:
 def test_what_is_late_about_turns_alone_is_no_lag(ms: int) -> None:
     """Friction that turns round smoothly, or sticks: of two clocks only what the rest of the motion shows."""
     t = np.arange(30_000) / 500
-    v = 0.3 * np.sin(1.7 * t) + 0.2 * np.sin(4.1 * t) + 0.1 * np.sin(9.3 * t)
-    a = np.gradient(v, t)
+    q, v, a = swing(t, [(0.3 / 1.7, 1.7, 0.0), (0.2 / 4.1, 4.1, 0.0), (0.1 / 9.3, 9.3, 0.0)], per=1)
     turned = np.maximum.accumulate(np.where(np.diff(np.sign(v), prepend=np.sign(v[0])) != 0, np.arange(len(t)), 0))
     sticks = (np.arange(len(t)) - turned < 25) & (turned > 0)
-    run = Recording(
-        "run", {"t": t, "tau": 2 * a + 2 * np.sign(v) * np.where(sticks, -1, 1) + 0.1 * v, "q": np.cumsum(v) / 500}
-    )
-    found = clocks([Balance([delayed(ms / 1e3)(run) if ms else run])], "run")
+    run = recorded(2 * a + 2 * np.sign(v) * np.where(sticks, -1, 1) + 0.1 * v, t, q)
+    found = clocks([Balance([delayed(ms / 1e3)(run)])], "run")
     assert [one.blocks_naming for one in found] == ([True] if ms else [])
-    assert all("18 ms" in one.statement for one in found)
+    assert all("20 ms" in one.statement for one in found)
+
+
+def late(lag: float, seconds: float = 60.0, missing: float = 0.0) -> Balance:
+    """Of a motion whose position comes so much later."""
+    t = np.arange(round(500 * seconds)) / 500
+    q, v, a = swing(t, [(0.3 / 1.7, 1.7, 0.0), (0.2 / 4.1, 4.1, 0.0)], per=1)
+    return Balance([delayed(lag)(recorded(6 * a + 2 * np.sign(v) + missing * np.cos(13.0 * t), t, q))])
 
 
 @pytest.mark.parametrize(("missing", "withholds"), [(0.0, True), (0.6, False)])
 def test_a_lag_that_leaves_much_is_said_and_withholds_no_name(missing: float, withholds: bool) -> None:
     """What is missing from a balance may look late too: then the best lag leaves most of it."""
-    t = np.arange(30_000) / 500
-    v = 0.3 * np.sin(1.7 * t) + 0.2 * np.sin(4.1 * t)
-    tau = 6 * np.gradient(v, t) + 2 * np.sign(v) + missing * np.cos(13.0 * t)
-    run = delayed(0.02)(Recording("run", {"t": t, "tau": tau, "q": np.cumsum(v) / 500}))
-    offset = clock_offset([Balance([run])])
+    run = late(0.02, missing=missing)
+    offset = clock_offset([run])
     assert offset.is_late
     assert (offset.removed >= 0.7) is withholds
-    assert [one.blocks_naming for one in clocks([Balance([run])], "run")] == [withholds]
+    assert [one.blocks_naming for one in clocks([run], "run")] == [withholds]
 
 
 @pytest.mark.parametrize(("other", "told"), [(0.024, True), (0.0, False)])
 def test_a_lag_that_another_recording_contradicts_is_no_clocks(other: float, told: bool) -> None:
     """An eccentric encoder's ripple looks late at one speed and early at another; a clock is that of all recordings."""
-
-    def run(seconds: float, late: float) -> Recording:
-        t = np.arange(500 * seconds) / 500
-        v = 0.3 * np.sin(1.7 * t) + 0.2 * np.sin(4.1 * t)
-        tau = 6 * np.gradient(v, t) + 2 * np.sign(v)
-        made = Recording("run", {"t": t, "tau": tau, "q": np.cumsum(v) / 500})
-        return delayed(late)(made) if late else made
-
-    pair = [Balance([run(60, 0.024)]), Balance([run(15, other)])]
+    pair = [late(0.024), late(other, seconds=15.0)]
     assert abs(clock_offset(pair).lag - 0.024) < 0.004
     assert bool(clocks(pair, "both")) is told
 
@@ -293,14 +264,6 @@ def test_many_recordings_are_judged_in_a_few_groups() -> None:
 # Measured recordings, or ones that are made of the same machines' numbers, as they are and with a slip put in.
 
 
-def refusal(card: Card, recordings: tuple[Recording, ...], change: Change) -> str:
-    """The message of the refusal, or what is said instead and blocks names."""
-    try:
-        return " ".join(one[1] for one in said(card, recordings, change) if one[2])
-    except RecordingError as error:
-        return str(error)
-
-
 MEASURED = {
     "quasi_direct_pendulum": ("ddp", "direct_collocation", "energy_shaping", 0.15, 0.15),
     "anticogging_motor": ("acc_a", "sp1_off", "acc_b", 4.8e-6, 2e-3),
@@ -317,28 +280,32 @@ UNTOLD = {("anticogging_motor", "late"): "turns at nearly constant speed do not 
 """Slips of which nothing is said, and why."""
 
 
-class TestMeasured:
-    def given(self, machine: str) -> tuple[Card, tuple[Recording, ...]]:
-        *names, inertia, friction = MEASURED[machine]
-        card = parse_card(
-            f'[mount]\ninertia = {inertia}\n[friction]\nmodel = "coulomb"\nFc = {friction}\nsigma2 = 0.0\n', "card.toml"
-        )
-        return card, tuple(read(machine, name) for name in names)
+def measured(machine: str) -> tuple[Card, tuple[Recording, ...]]:
+    *names, inertia, friction = MEASURED[machine]
+    text = f'[mount]\ninertia = {inertia}\n[friction]\nmodel = "coulomb"\nFc = {friction}\nsigma2 = 0.0\n'
+    return parse_card(text, "card.toml"), tuple(read(machine, name) for name in names)
 
-    @pytest.mark.parametrize("machine", MEASURED)
-    def test_the_recordings_as_they_are_are_let_pass(self, machine: str) -> None:
-        """The pendulum's position comes 16 ms after its torque, which is said and blocks nothing."""
-        assert [one for one in said(*self.given(machine)) if one[2] or one[0] != "clocks"] == []
 
-    @pytest.mark.parametrize(("machine", "slip"), [one for one in product(MEASURED, SLIPS) if one not in UNTOLD])
-    def test_a_slip_is_called_by_its_name(self, machine: str, slip: str) -> None:
-        change, finding, words = SLIPS[slip]
-        found = said(*self.given(machine), change)
-        assert set(finding.split("|")) & {one[0] for one in found}
-        assert any(words in one[1] for one in found)
-        assert any(one[2] for one in found) or (machine, slip) in DIFFICULT
+@pytest.mark.parametrize("machine", MEASURED)
+def test_the_recordings_as_they_are_are_let_pass(machine: str) -> None:
+    """The pendulum's position comes 16 ms after its torque, which is said and blocks nothing."""
+    assert [one for one in said(*measured(machine)) if one[2] or one[0] != "clocks"] == []
 
-    @pytest.mark.parametrize(("machine", "slip"), list(product(MEASURED, REFUSED)))
-    def test_a_wrong_unit_is_refused_or_blocks(self, machine: str, slip: str) -> None:
-        change, option = REFUSED[slip]
-        assert f"Use {option}." in refusal(*self.given(machine), change)
+
+@pytest.mark.parametrize(("machine", "slip"), [one for one in product(MEASURED, SLIPS) if one not in UNTOLD])
+def test_a_slip_is_called_by_its_name(machine: str, slip: str) -> None:
+    change, finding, words = SLIPS[slip]
+    found = said(*measured(machine), change)
+    assert set(finding.split("|")) & {one[0] for one in found}
+    assert any(words in one[1] for one in found)
+    assert any(one[2] for one in found) or (machine, slip) in DIFFICULT
+
+
+@pytest.mark.parametrize(("machine", "slip"), list(product(MEASURED, REFUSED)))
+def test_a_wrong_unit_is_refused_or_blocks(machine: str, slip: str) -> None:
+    change, option = REFUSED[slip]
+    try:
+        told = " ".join(one[1] for one in said(*measured(machine), change) if one[2])
+    except RecordingError as error:
+        told = str(error)
+    assert f"Use {option}." in told
