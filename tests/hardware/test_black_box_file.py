@@ -22,6 +22,7 @@ ORIGIN: dict[str, Any] = {
     "encoder": "q",
     "machine": {"encoder": {"heads": 0}},
 }
+DAMAGED = "whose head is damaged, or that is cut short"
 
 
 def filled(path: Path, capacity: int, count: int, origin: dict[str, Any] = ORIGIN) -> None:
@@ -99,7 +100,7 @@ WRONG: list[dict[str, Any]] = [
 @pytest.mark.parametrize("origin", WRONG)
 def test_a_head_that_lacks_what_a_recording_needs_is_damaged(tmp_path: Path, origin: dict[str, Any]) -> None:
     BlackBox(tmp_path / "box", 4, origin).close()
-    with pytest.raises(HardwareError, match="whose head is damaged, or that is cut short"):
+    with pytest.raises(HardwareError, match=DAMAGED):
         read_black_box(tmp_path / "box")
 
 
@@ -114,11 +115,26 @@ def test_a_head_that_has_it_is_whole(tmp_path: Path, more: dict[str, Any]) -> No
     assert read_black_box(tmp_path / "box").origin == origin | {"capacity": 4}
 
 
-@pytest.mark.parametrize("capacity", [0, -4, True, 4.0, "4", 3, 5])
-def test_a_head_with_another_room_than_the_file_has_is_damaged(tmp_path: Path, capacity: Any) -> None:
-    head = MAGIC + json.dumps(ORIGIN | {"capacity": capacity}).encode() + b"\n"
+HEADS = {
+    f"{capacity!r} records of 4": json.dumps(ORIGIN | {"capacity": capacity}).encode()
+    for capacity in (0, -4, True, 4.0, "4", 3, 5, 99_999_999_999)
+} | {"no JSON": b"x", "list": b"[1]", "empty": b"{}", "nested": b"[" * 30_000, "noise": bytes(range(256)) * 10}
+
+
+@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
+def test_a_head_with_another_room_than_the_file_has_or_that_is_none_is_damaged(tmp_path: Path, head: bytes) -> None:
+    head = MAGIC + head + b"\n"
     (tmp_path / "box").write_bytes(head.ljust(HEADER, b"\n") + bytes(4 * RECORD.itemsize))
-    with pytest.raises(HardwareError, match="whose head is damaged, or that is cut short"):
+    with pytest.raises(HardwareError, match=DAMAGED):
+        read_black_box(tmp_path / "box")
+
+
+@pytest.mark.parametrize("size", [HEADER // 2, HEADER, -1, 1])
+def test_a_black_box_that_is_cut_or_longer_is_damaged(tmp_path: Path, size: int) -> None:
+    filled(tmp_path / "box", 8, 10)
+    raw = (tmp_path / "box").read_bytes()
+    (tmp_path / "box").write_bytes(raw + b"\0" if size == 1 else raw[:size])
+    with pytest.raises(HardwareError, match=f"is no black box of this version|{DAMAGED}"):
         read_black_box(tmp_path / "box")
 
 
@@ -159,10 +175,7 @@ def test_a_loop_that_has_gone_on_leaves_out_what_it_may_be_writing(tmp_path: Pat
     box.close()
 
 
-@given(
-    st.integers(-(2**31), 2**31 - 1),
-    st.lists(st.integers(-(2**31) + 1, 2**31 - 1), max_size=30),
-)
+@given(st.integers(-(2**31), 2**31 - 1), st.lists(st.integers(-(2**31) + 1, 2**31 - 1), max_size=30))
 def test_counts_that_wrap_are_a_position_that_does_not(first: int, steps: list[int]) -> None:
     places = np.cumsum([first, *steps])
     np.testing.assert_array_equal(unwrapped(places % 2**32), places)

@@ -19,7 +19,6 @@ from cosim.support.errors import HardwareError, MissingPackageError
 from cosim_ethercat.drive import CHECKED_EVERY, FRAME_US, STATE_US, TRIES
 from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 RATED = 100.0
 
 
@@ -72,9 +71,11 @@ def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_s
 def test_the_mapping_written_into_the_drive_is_that_of_the_machine_file(
     tmp_path: Path, bus: type[fake_soem.Master]
 ) -> None:
+    """Torque fits into its 16 bits to the last count."""
     outputs = [{"name": "torque", "object": 0x6071, "bits": 16}, {"object": 0x6072, "bits": 16}]
     outputs += [{"name": "controlword", "object": 0x6040, "bits": 16}]
-    with session(tmp_path, machine(outputs=outputs, receive_pdo=0x1602, distributed_clock=True)) as one:
+    given = {"outputs": outputs, "receive_pdo": 0x1602, "distributed_clock": True, "rated_torque": 50 / 32.767}
+    with session(tmp_path, machine(**given)) as one:
         one.advance(10)
         slave = bus.last.slaves[0]
         assert slave.mapped(0x1C12) == [(0x6071, 2), (0x6072, 2), (0x6040, 2)]
@@ -147,7 +148,8 @@ def test_a_drive_that_is_enabled_in_another_mode_is_a_fault(tmp_path: Path, bus:
         ("none0", {}, {}, r"could not open interface none0 \(EtherCAT needs the rights of root\)"),
         ("fake0", {}, {"count": 0}, "no slave 0 at fake0, which has 0"),
         ("fake0", {"position": 3}, {}, "no slave 3 at fake0, which has 1"),
-        ("fake0", {"rated_torque": 200.0}, {}, r"limits.torque_mismatch = 0.1 N m is below what the drive counts"),
+        ("fake0", {"rated_torque": 100.1}, {}, r"limits.torque_mismatch = 0.1 N m is below what the drive counts"),
+        ("fake0", {"rated_torque": 50 / 32.7671}, {}, r"limits.torque = 50 N m does not fit into 16 bits of 0.0015"),
     ],
 )
 def test_a_bus_or_drive_that_does_not_fit_is_refused(

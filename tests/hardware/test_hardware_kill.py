@@ -26,8 +26,6 @@ ATTEMPTS = 5
 LONG = 60.0
 """Set points of so many seconds: however often a busy computer has to begin again, they do not end before the kill."""
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
-
 
 def operating(one: Session) -> Session:
     """Bring a session in real time into operation, with torque; begun again as often as a busy computer is late."""

@@ -1,8 +1,10 @@
-"""A replay compares every column bit for bit, sees what is missing, and believes nothing that a recording says."""
+"""A black box says what happened; a replay compares each column bit for bit and believes nothing that is said."""
 
 import json
+import os
 import shutil
-import sys
+import signal
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -11,17 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, invoke, recorded, scenario, session
+from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario, session
 
 from cosim.data.recording import Recording
-from cosim.hardware.blackbox import HEADER, MAGIC, read_black_box
 from cosim.hardware.replay import replay
-from cosim.hardware.session import run_session
+from cosim.hardware.session import Session, run_session
 from cosim.hardware.story import broken_seal, seal_of
+from cosim.master.simulate import run
 from cosim.support.errors import CosimError, HardwareError
 from cosim.support.files import cache_home
-
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+from cosim.system.wire import Record
 
 SHORT = ("stop = 0.4", "stop = 0.12")
 
@@ -123,12 +124,17 @@ def test_the_seal_depends_on_every_name_and_number() -> None:
         assert seal_of(other, {})["sha256"] != one["sha256"]
 
 
-def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(tmp_path: Path) -> None:
-    path = tmp_path / "s.toml"
+def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = tmp_path / "s.toml", tmp_path / "out"
     path.write_text(SCENARIO.replace(*SHORT), "utf-8")
-    assert invoke("run", str(path), "--fast", "--out", str(tmp_path / "out")).exit_code == 0
-    session = Recording.read(tmp_path / "out" / "recording.parquet", required=())
+    done = invoke("run", str(path), "--fast", "--out", str(out))
+    assert done.exit_code == 0, done.output
+    session = Recording.read(out / "recording.parquet", required=())
     assert replay(session).identical
+    cards = session.origin["hardware"]["cards"]
+    assert {name: one["card"] for name, one in cards.items()} == {"mount": "paper_mount", "controller": "paper_mount"}
     for altered in (
         with_story(session, lambda story: story["cards"]["mount"].update(sha256="0" * 64)),
         with_story(session, lambda story: story["cards"]["mount"].update(card="another")),
@@ -136,11 +142,12 @@ def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(tm
         with_story(session, lambda story: story["machine"]["limits"].update(following_error=9.0)),
         with_story(session, lambda story: story.update(scenario="")),
     ):
-        done = replay(altered)
-        assert (done.noticed, done.identical) == (
-            "what it says of its machine, controller and cards was altered",
-            False,
-        )
+        said = "what it says of its machine, controller and cards was altered"
+        assert (replay(altered).noticed, replay(altered).identical) == (said, False)
+    command = "replay", str(out / "recording.parquet")
+    assert [invoke(*command, "--card", card).exit_code for card in ("paper_mount", "emps")] == [0, 2]
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
+    assert invoke(*command).exit_code == 2, "the controller is in no cache"
 
 
 def test_a_column_too_much_or_too_few_is_seen(whole: Recording) -> None:
@@ -210,41 +217,51 @@ def test_another_controller_is_refused(whole: Recording, tmp_path: Path) -> None
         replay(renamed)
 
 
-def test_the_command_finds_the_controller_by_the_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "s.toml"
-    path.write_text(SCENARIO.replace(*SHORT), "utf-8")
-    done = invoke("run", str(path), "--fast", "--out", str(tmp_path / "out"))
-    assert done.exit_code == 0, done.output
-    recording = tmp_path / "out" / "recording.parquet"
-    said = Recording.read(recording, required=()).origin["hardware"]["cards"]
-    assert {name: one["card"] for name, one in said.items()} == {"mount": "paper_mount", "controller": "paper_mount"}
-    assert invoke("replay", str(recording), "--card", "paper_mount").exit_code == 0
-    other = invoke("replay", str(recording), "--card", "emps")
-    assert other.exit_code == 2
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
-    assert invoke("replay", str(recording)).exit_code == 2
+def test_the_recording_is_one_that_a_diagnosis_reads(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        run_session(one)
+    path = recorded(tmp_path).write(tmp_path / "r.parquet")
+    read = Recording.read(path)
+    assert {"tau", "q", "q_d"} <= set(read)
+    assert [read.units[one] for one in ("t", "tau", "q", "q_d", "v_d")] == ["s", "N.m", "rad", "rad", "rad/s"]
+    what = scenario()
+    twin = run(replace(what, records={"tau": Record("mount.tau", "mean")})).recording
+    first = int(np.flatnonzero(read["machine.notes"].astype(int) & 1)[0])
+    assert np.allclose(read["tau"][first:][1:3999], twin["tau"][1:3999], rtol=1e-15, atol=1e-15)
+    assert replay(read).identical
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda raw: raw[: HEADER // 2],
-        lambda raw: raw[:-1],
-        lambda raw: raw[:HEADER],
-        lambda raw: raw + b"\0",
-        lambda raw: MAGIC + b"x" + raw[len(MAGIC) + 1 :],
-        lambda raw: MAGIC + b"[1]\n" + raw[len(MAGIC) + 4 :],
-        lambda raw: MAGIC + b"{}\n" + raw[len(MAGIC) + 3 :],
-        lambda raw: MAGIC + b'{"capacity": -1}\n' + raw[len(MAGIC) + 17 :],
-        lambda raw: MAGIC + b'{"capacity": 99999999999}\n' + raw[len(MAGIC) + 26 :],
-        lambda raw: MAGIC + b"[" * 30_000 + raw[len(MAGIC) + 30_000 :],
-        lambda raw: MAGIC + bytes(range(256)) * 10 + raw[len(MAGIC) + 2560 :],
-    ],
-)
-def test_a_black_box_that_is_damaged_is_a_sentence(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
-    with session(tmp_path, what=scenario(SHORT)) as one:
+def test_a_black_box_is_let_go_of_when_its_session_ends(tmp_path: Path) -> None:
+    def mapped() -> bool:
+        return str(tmp_path / "box") in Path("/proc/self/maps").read_text()
+
+    with session(tmp_path) as one:
         one.advance(10)
-    path = tmp_path / "box"
-    path.write_bytes(damage(path.read_bytes()))
-    with pytest.raises(HardwareError, match=r"is no black box of this version|whose head is damaged, or that is cut"):
-        read_black_box(path)
+        assert mapped()
+    assert not mapped(), "though the session is still there"
+    assert one is not None
+
+
+def test_a_ring_that_is_full_keeps_the_end_and_says_that_the_beginning_is_gone(tmp_path: Path) -> None:
+    short = SIMULATED.model_copy(update={"black_box_seconds": 0.05})
+    with session(tmp_path, short) as one:
+        one.advance(1234)
+    found = recorded(tmp_path)
+    assert np.array_equal(found["machine.tick"], np.arange(734, 1234))
+    with pytest.raises(HardwareError, match="begins at cycle 734"):
+        replay(found)
+
+
+def test_a_late_loop_is_told_and_the_simulated_machine_waits_for_it(tmp_path: Path) -> None:
+    with Session(scenario(), SIMULATED, tmp_path / "box") as one:
+        one.enable()
+        os.kill(one.loop.process, signal.SIGSTOP)
+        time.sleep(0.1)  # a thousand cycles
+        os.kill(one.loop.process, signal.SIGCONT)
+        ended = one.track(500)
+        assert ended.running
+        assert ended.faults == ()
+        assert one.statistics["late_cycles"] > 500
+    found = recorded(tmp_path)
+    assert not found["machine.late"].any()
+    assert replay(found).identical

@@ -1,7 +1,6 @@
 """Four read heads: their mean forgets the disc's eccentricity, and one of them may fail."""
 
 import ctypes
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from cosim.hardware.words import heads_of
 from cosim.support.errors import HardwareError
 from cosim.system.scenario import Scenario
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 QUANTUM, ECCENTRIC, APART = 1.4629180792671596e-9, 2e-5, 1e-4
 FAST = (
     ("max_velocity = 2e-3", "max_velocity = 0.15"),

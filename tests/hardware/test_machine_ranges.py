@@ -1,9 +1,12 @@
 """What a machine file may hold, each number at its limits and beyond, and what it is where the file says nothing."""
 
+from pathlib import Path
+
 import pytest
 from on_hardware import SIMULATED
 
-from cosim.hardware.machine import Machine, changed
+from cosim.hardware.machine import Machine, changed, read_machine
+from cosim.hardware.words import LIMITS
 from cosim.support.errors import HardwareError
 
 LARGE, LONG = 1e12, 1e9
@@ -76,3 +79,24 @@ def test_what_a_file_does_not_say_is_what_the_documentation_says() -> None:
         "window_ms": 1000.0,
         "heartbeat_ms": 500.0,
     }
+
+
+LIMITED = "\n[limits]\n" + "\n".join(f"{name} = 1.0" for name in LIMITS)
+BEGUN = 'name = "x"\nadapter = "simulated"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (BEGUN, '"limits" is missing'),
+        (f'name = "x"\nadapter = "wireless"{LIMITED}', "adapter = 'wireless' breaks a rule"),
+        (f"{BEGUN}heat = 1{LIMITED}", '"heat" is no key of a machine; keys there are: name'),
+        (f"{BEGUN}[limits]\ntorque = 50.0", '"limits.slew" is missing'),
+        ("name = ", "not valid TOML"),
+        ('name = "\udc98"', r"m\.toml is not text in UTF-8 \(at byte 8\)"),
+    ],
+)
+def test_a_file_that_is_no_machine_is_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "m.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(HardwareError, match=sentence):
+        read_machine(tmp_path / "m.toml")
