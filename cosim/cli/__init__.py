@@ -25,7 +25,7 @@ from cosim.cli.settings import PAIRS, Settings, read_settings
 from cosim.cli.verbs import modules, verbs
 from cosim.support.errors import CosimError, InputError, PlugInError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
-from cosim.support.suffixes import RECORDINGS
+from cosim.support.suffixes import recordings
 from cosim.support.system_errors import surroundings
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say, say_once_begun
 from cosim.support.threads import VARIABLES
@@ -155,7 +155,7 @@ def repeated(arguments: Sequence[str]) -> list[str]:
 def is_file(argument: str) -> bool:
     """Whether an argument names a file: one that is there, in a folder, or with the suffix of a recording."""
     path = argument.partition(":")[0]
-    return os.path.exists(path) or os.sep in argument or path.lower().endswith(RECORDINGS)
+    return os.path.exists(path) or os.sep in argument or path.lower().endswith(recordings())
 
 
 def application(arguments: Sequence[str], debug: bool = False, settings: Settings = NONE) -> typer.Typer:

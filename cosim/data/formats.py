@@ -1,14 +1,14 @@
 """File formats of recordings: bytes to named columns, nothing judged yet.
 
-Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, MDF4, MCAP and bags of
-ROS 1 and 2. Units come along where a file states them; see `Columns`.
+Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, MDF4, and what is plugged
+in (`cosim.support.plugins`): MCAP and bags of ROS 1 and 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from cosim.data.binary import apart, hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
+from cosim.data.binary import apart, hdf5, matlab, mdf, numpy_files, parquet
 from cosim.data.columns import Columns
 from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
@@ -17,6 +17,8 @@ from cosim.data.text import json_records
 from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
 from cosim.support.errors import RecordingError
+from cosim.support.plugins import READERS, loaded, names
+from cosim.support.suffixes import recordings
 
 __all__ = ["Columns", "read_columns", "suffix_of"]
 
@@ -47,17 +49,18 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     Raises:
         RecordingError: the file is missing, empty, too large, of an unknown kind, or cannot be read.
         MissingPackageError: its format needs an optional package.
+        PlugInError: what is plugged in for its suffix cannot be loaded.
     """
     _check_file(path)
     suffix = suffix_of(path)
-    reader = _READERS.get(suffix)
+    reader = _reader(suffix)
     if reader is None:
         raise RecordingError(f"{path} is {_what_to_do(path, suffix)}", culprit=str(path))
     stated = {key: text for key, text in (layout or {}).items() if key not in (LIMIT, *OF_ROWS)}
     here = partial(read_text, stated=stated) if reader is read_text else reader
 
     def read(path: Path) -> Columns:
-        columns = apart.read_apart(path, suffix, reader) if reader in _APART else here(path)
+        columns = apart.read_apart(path, suffix, reader) if _is_apart(reader) else here(path)
         return in_columns(path, parted(path, columns))
 
     with within(allowed_by(path, (layout or {}).get(LIMIT, ""))):
@@ -69,14 +72,28 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
 
 def is_recording(path: Path) -> bool:
     """Whether a file is of a kind that may hold a recording, and no folder."""
-    return suffix_of(path) in _READERS and path.is_file()
+    return suffix_of(path) in recordings() and path.is_file()
+
+
+def _reader(suffix: str) -> Callable[..., Columns] | None:
+    """What reads files of a suffix: one of ours, or what is plugged in for it."""
+    if suffix in _READERS or suffix.removeprefix(".") not in names(READERS):
+        return _READERS.get(suffix)
+    plugged: Callable[..., Columns] = loaded(READERS, suffix.removeprefix("."))
+    return plugged
+
+
+def _is_apart(reader: Callable[..., Columns]) -> bool:
+    return reader in _APART or reader not in _READERS.values()
 
 
 def _what_to_do(path: Path, suffix: str) -> str:
     """Say what a file is that is not read here, and how it becomes one that is."""
     told = CONVERTED.get(path.suffix.lower())
     return (
-        f"{told}." if told else f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(_READERS)}."
+        f"{told}."
+        if told
+        else f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(recordings())}."
     )
 
 
@@ -119,9 +136,6 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".h5": hdf5.read,
     ".hdf5": hdf5.read,
     ".mf4": mdf.read,
-    ".mcap": mcap.read,
-    ".db3": rosbag.read,
-    ".bag": ros1.read,
     ".txt": read_text,
     ".txt.gz": read_text,
     ".tsv": read_text,
@@ -130,5 +144,5 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".asc": read_text,
     ".lvm": read_text,
 }
-_APART = (hdf5.read, matlab.read, mdf.read, mcap.read, ros1.read, rosbag.read)
-"""Those by libraries that may crash or hang on a damaged file."""
+_APART = (hdf5.read, matlab.read, mdf.read)
+"""Those by libraries that may crash or hang on a damaged file, as may what is plugged in."""

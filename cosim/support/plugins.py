@@ -6,6 +6,8 @@
     cosim.exports      "simulators": plans the files of a card for other simulators, see `cosim.api.export.Simulators`;
                        "system": writes a system as one FMU
     cosim.identifiers  "model": what `cosim.identify` calls for an FMU or a system in the place of a card
+    cosim.readers      "bag": reads files of the suffix .bag; a function of a path to `cosim.data.columns.Columns`,
+                       run in a process of its own with limits of memory and time
     cosim.formulas     a function that looks for a closed form in the place of a learned table, see
                        `cosim.diagnosis.terms.closed_form`
     cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
@@ -20,7 +22,7 @@ from typing import Any
 from cosim.support.errors import PlugInError
 
 EXPORTS, HANDLES, IDENTIFIERS = "cosim.exports", "cosim.handles", "cosim.identifiers"
-VERBS, TRANSPORTS = "cosim.verbs", "cosim.transports"
+READERS, VERBS, TRANSPORTS = "cosim.readers", "cosim.verbs", "cosim.transports"
 
 
 @cache

@@ -1,7 +1,14 @@
 """Suffixes of the files that may hold a recording, known without loading a reader."""
 
-RECORDINGS = (
+from cosim.support.plugins import READERS, names
+
+OURS = (
     *(".csv", ".csv.gz", ".tsv", ".txt", ".txt.gz", ".log", ".dat", ".asc", ".lvm"),
     *(".json", ".json.gz", ".jsonl", ".jsonl.gz", ".ndjson", ".parquet", ".npz", ".npy"),
-    *(".mat", ".h5", ".hdf5", ".mf4", ".mcap", ".db3", ".bag"),
+    *(".mat", ".h5", ".hdf5", ".mf4"),
 )
+
+
+def recordings() -> tuple[str, ...]:
+    """Suffixes of all that is read, those that packages plug in last."""
+    return (*OURS, *(f".{name}" for name in names(READERS)))

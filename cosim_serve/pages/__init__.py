@@ -15,7 +15,7 @@ from cosim.plots.quantities import minus, raised
 from cosim.reading import LAYOUT
 from cosim.support.files import in_bytes
 from cosim.support.plain import Parsed
-from cosim.support.suffixes import RECORDINGS
+from cosim.support.suffixes import recordings
 from cosim_serve.chart import Chart, chart
 from cosim_serve.desk import OURS, Desk
 from cosim_serve.folder import plain_files
@@ -45,7 +45,7 @@ HINTS = {
     "limit": "3: three times as much",
 }
 """Examples of what a layout may say."""
-SUFFIXES = ",".join(dict.fromkeys("." + one.rpartition(".")[2] for one in (*RECORDINGS, ".toml")))
+SUFFIXES = ",".join(dict.fromkeys("." + one.rpartition(".")[2] for one in (*recordings(), ".toml")))
 """Kinds of files that a file dialogue offers first."""
 CARD = """[mount]
 name = "azimuth"

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from math import pi
 from pathlib import Path
 
 import pytest
@@ -19,12 +20,27 @@ def hello(name: str, loud: bool = False) -> None:
 def wave() -> None:
     """Wave."""
     print("waved")
+def read(path):
+    """Read a log of our own: a row a line."""
+    import os
+    import numpy as np
+    from cosim.data.columns import Columns
+    if path.read_bytes().startswith(b"crash"):
+        os.abort()
+    t, tau, q = np.loadtxt(path).T
+    return Columns({"t": t, "tau": tau, "q": q}, units={"q": "deg"})
 '''
 POINTS = """[cosim.verbs]
 hello = hello_of_mine
 hardware.wave = hello_of_mine
 broken = no_such_module
 run = hello_of_mine
+[cosim.handles]
+greet = hello_of_mine:hello
+run = hello_of_mine:hello
+[cosim.readers]
+ours = hello_of_mine:read
+csv = hello_of_mine:read
 """
 
 
@@ -39,8 +55,12 @@ def site(tmp_path: Path) -> Path:
 
 
 def cosim(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return python(site, "-m", "cosim", *words)
+
+
+def python(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])
-    command = [sys.executable, "-m", "cosim", *words]
+    command = [sys.executable, *words]
     return subprocess.run(
         command, env=os.environ | {"PYTHONPATH": path}, cwd=site, capture_output=True, text=True, check=False
     )
@@ -74,6 +94,23 @@ def test_what_cannot_be_loaded_is_one_sentence_and_hides_nothing_else(site: Path
 
 def test_no_plug_in_takes_the_name_of_a_verb_that_there_is(site: Path) -> None:
     assert "Run a scenario" in cosim(site, "run", "--help").stdout
+
+
+def test_python_finds_what_it_brings_under_its_name_and_ours_under_ours(site: Path) -> None:
+    code = "import cosim; cosim.greet('you'); print('greet' in dir(cosim), cosim.run.__module__)"
+    assert python(site, "-c", code).stdout == "hello you\nTrue cosim.api.run\n"
+
+
+def test_a_file_of_its_own_kind_is_read_and_one_that_crashes_its_reader_is_a_sentence(site: Path) -> None:
+    rows = "\n".join(f"{k / 100} {k % 7} {k % 90}" for k in range(400))
+    for name in ("one.ours", "one.csv"):
+        (site / name).write_text(rows, "utf-8")
+    (site / "two.ours").write_text("crash", "utf-8")
+    code = "import cosim, sys; one = cosim.read(sys.argv[1]); print(len(one['t']), round(one['q'].max(), 9))"
+    assert python(site, "-c", code, "one.ours").stdout == f"400 {round(89 * pi / 180, 9)}\n"
+    assert "--columns t=#1" in python(site, "-c", code, "one.csv").stderr  # .csv stays ours, which asks for names
+    crashed = python(site, "-c", code, "two.ours").stderr.splitlines()[-1]
+    assert "two.ours is damaged: the library that reads .ours files crashed on it" in crashed
 
 
 def test_a_verb_of_the_trunk_asks_for_no_plug_in(site: Path) -> None:

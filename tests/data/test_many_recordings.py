@@ -17,7 +17,7 @@ from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.reading import read_recordings
 from cosim.support.errors import InputError, ManyRecordingsError, RecordingError
-from cosim.support.suffixes import RECORDINGS
+from cosim.support.suffixes import recordings
 from cosim_serve.pages import SUFFIXES
 
 ROWS = 300
@@ -278,8 +278,8 @@ def test_a_file_whose_name_has_the_sign_is_one_file(tmp_path: Path) -> None:
 
 
 def test_what_is_offered_is_read_and_what_is_read_is_offered(tmp_path: Path) -> None:
-    for suffix in (*RECORDINGS, ".toml", ".md"):
+    for suffix in (*recordings(), ".toml", ".md"):
         path = tmp_path / f"run{suffix}"
         path.touch()
-        assert is_recording(path) == (suffix in RECORDINGS), suffix
-        assert suffix not in RECORDINGS or path.suffix in SUFFIXES.split(",")
+        assert is_recording(path) == (suffix in recordings()), suffix
+        assert suffix not in recordings() or path.suffix in SUFFIXES.split(",")

@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.messages import Message, columns_of
 from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_unpacked, short
+from cosim_bags.messages import Message, columns_of
 
 
 def read(path: Path) -> Columns:

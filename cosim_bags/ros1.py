@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.messages import Message, columns_of
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_time, check_unpacked, short
 from cosim.support.errors import RecordingError
+from cosim_bags.messages import Message, columns_of
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, CHUNK, CONNECTION = 2, 5, 7
