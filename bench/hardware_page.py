@@ -88,7 +88,7 @@ def fault_lines(found: dict[str, Any]) -> list[str]:
         ),
         "",
         f"Detected: {found['detected']:.0%} in the worst row. A controller that gives no number or fails, a drive that",
-        "leaves operation and an adapter that says so itself are provoked in `test_hardware_faults.py`. A",
+        "leaves operation and an adapter that says so itself are provoked in `test_axis_safety.py`. A",
         "heartbeat is lost 500 ms after the last one; missed edges are known when the last of the 64 is over.",
     ]
 

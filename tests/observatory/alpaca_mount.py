@@ -5,13 +5,9 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import radians
 from time import monotonic, sleep
-from typing import Any
-
-import pytest
 
 from cosim.models.cache import with_fmus
 from cosim.system.scenario import read_scenario
-from cosim_observatory.alpaca import Server
 from cosim_observatory.mount import Limits, SimulatedMount
 from cosim_observatory.pointing import Pointing
 from cosim_observatory.telescope import Telescope
@@ -26,25 +22,6 @@ def simulated() -> Iterator[Telescope]:
     """A telescope of the shipped mount that moves quickly, twenty times as fast as the clock."""
     with SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=20.0) as mount:
         yield Telescope(Pointing(mount, radians(9.0), BEGUN))
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with simulated() as mount, Server(mount, port=0, discovery=0) as one:
-        yield one
-
-
-@pytest.fixture
-def telescope(server: Server) -> Iterator[Any]:
-    """The client's telescope, connected, unparked, at rest, not tracking."""
-    alpaca = pytest.importorskip("alpaca.telescope", reason="alpyca is not installed (pip install '.[alpaca]')")
-    one = alpaca.Telescope(f"127.0.0.1:{server.port}", 0)
-    one.Connected = True
-    until(lambda: not one.Slewing)
-    one.Unpark()
-    one.Tracking = False
-    yield one
-    until(lambda: not one.Slewing)
 
 
 def until(done: Callable[[], bool], seconds: float = 20.0) -> None:

@@ -30,6 +30,16 @@ class Rule:
         return f"{self.text}: {self.method} {self.path} {self.given or ''}"
 
 
+def get(text: str, name: str, wanted: Any = 0, given: Given | None = None, state: str = "free") -> Rule:
+    """A rule of a value; `name` is that of a member, or an address."""
+    return Rule(text, state, "GET", name if name.startswith("/") else BASE + name, given or {}, wanted)
+
+
+def put(text: str, name: str, wanted: int = 0, given: Given | None = None, state: str = "free") -> Rule:
+    """A rule of a method or of setting a value."""
+    return Rule(text, state, "PUT", BASE + name, given or {}, wanted)
+
+
 def kind(*kinds: type) -> Callable[[Any], bool]:
     return lambda value: type(value) in kinds
 
@@ -70,134 +80,114 @@ ABSENT_METHODS = (
     "commandblind", "commandbool", "commandstring", "findhome", "pulseguide", "setpark", "slewtoaltaz",
     "slewtocoordinates", "slewtotarget", "synctoaltaz", "synctocoordinates", "synctotarget",
 )  # fmt: skip
-READ_ONLY = ("altitude", "azimuth", "canpark", "declination", "rightascension", "siderealtime", "slewing", "atpark")
+READ_ONLY = (
+    "altitude", "azimuth", "canpark", "declination", "rightascension", "siderealtime", "slewing", "atpark",
+    "sitelatitude", "sitelongitude", "siteelevation", "utcdate", "doesrefraction",
+)  # fmt: skip
 NO_NUMBERS = ("", " 1", "1 ", "0x1", "1_0", "one", "nan", "inf", "-Infinity", "1e999", "1,5", "٣", "--1", "1e", ".")
 
 
 def members() -> Iterator[Rule]:
     for name, wanted in (COMMON | VALUES).items():
-        yield Rule("a member has a value of its kind and range", "free", "GET", BASE + name, {}, wanted)
+        yield get("a member has a value of its kind and range", name, wanted)
     for name in COMMON:
-        yield Rule("a member of every device answers without a connection", "disconnected", "GET", BASE + name)
+        yield get("a member of every device answers without a connection", name, state="disconnected")
     for name in VALUES:
-        yield Rule("without a connection there is no value", "disconnected", "GET", BASE + name, {}, NOT_CONNECTED)
+        yield get("without a connection there is no value", name, NOT_CONNECTED, state="disconnected")
     for name in ABSENT:
-        yield Rule("what the mount lacks is not implemented", "free", "GET", BASE + name, {}, NOT_IMPLEMENTED)
+        yield get("what the mount lacks is not implemented", name, NOT_IMPLEMENTED)
     for name in ABSENT_METHODS:
-        yield Rule("what the mount cannot do is not implemented", "free", "PUT", BASE + name, {}, NOT_IMPLEMENTED)
+        yield put("what the mount cannot do is not implemented", name, NOT_IMPLEMENTED)
     for name in READ_ONLY:
-        given = {name: 1}
-        yield Rule("what can only be read cannot be set", "free", "PUT", BASE + name, given, NOT_IMPLEMENTED)
-    for name in ("sitelatitude", "sitelongitude", "siteelevation", "utcdate", "doesrefraction"):
-        given = {name: 1}
-        yield Rule("what is fixed here cannot be set", "free", "PUT", BASE + name, given, NOT_IMPLEMENTED)
+        yield put("what can only be read or is fixed here cannot be set", name, NOT_IMPLEMENTED, {name: 1})
 
 
 def requests() -> Iterator[Rule]:
     for path in ("/API/v1/telescope/0/name", "/api/V1/telescope/0/name", "/api/v1/Telescope/0/name", BASE + "Name"):
-        yield Rule("an address is in lower case", "free", "GET", path, {}, BAD)
+        yield get("an address is in lower case", path, BAD)
     for path in ("/api/v1/telescope/1/name", "/api/v1/telescope/-1/name", "/api/v1/telescope/x/name", BASE + "none"):
-        yield Rule("there is no such device or member", "free", "GET", path, {}, BAD)
+        yield get("there is no such device or member", path, BAD)
     for path in ("/api/v2/telescope/0/name", "/api/v1/camera/0/name", "/api/v1/telescope/0", "/", "/api"):
-        yield Rule("there is no such version or kind of device", "free", "GET", path, {}, BAD)
+        yield get("there is no such version or kind of device", path, BAD)
     for name in ("park", "unpark", "abortslew", "slewtotargetasync", "moveaxis", "connect", "disconnect", "action"):
-        yield Rule("a method is called by PUT", "free", "GET", BASE + name, {}, BAD)
+        yield get("a method is called by PUT", name, BAD)
     for name in ("ClientID", "clientid", "CLIENTID", "ClientTransactionID", "clienttransactionid"):
-        yield Rule("names in a query may be spelt anyhow", "free", "GET", BASE + "name", {name: 7}, TEXT)
+        yield get("names in a query may be spelt anyhow", "name", TEXT, {name: 7})
     for number in ("-1", "4294967296", "1.0", "x", ""):
         for name in ("ClientID", "ClientTransactionID"):
-            yield Rule("numbers of a client are uint32", "free", "GET", BASE + "name", {name: number}, BAD)
-    yield Rule("ClientID may be as large as uint32", "free", "GET", BASE + "name", {"ClientID": 4294967295}, TEXT)
+            yield get("numbers of a client are uint32", "name", BAD, {name: number})
+    yield get("ClientID may be as large as uint32", "name", TEXT, {"ClientID": 4294967295})
     for name in ("tracking", "TRACKING", "trackinG", "Track"):
-        yield Rule("names in a body are spelt exactly", "free", "PUT", BASE + "tracking", {name: "True"}, BAD)
+        yield put("names in a body are spelt exactly", "tracking", BAD, {name: "True"})
     for text in ("True", "true", "TRUE", "False", "false"):
-        yield Rule("a boolean may be written in any case", "free", "PUT", BASE + "tracking", {"Tracking": text})
+        yield put("a boolean may be written in any case", "tracking", given={"Tracking": text})
     for text in ("", "1", "0", "yes", "on", " True", "T"):
-        yield Rule("a boolean is True or False", "free", "PUT", BASE + "tracking", {"Tracking": text}, BAD)
-    yield Rule("what nobody asked for is ignored", "free", "GET", BASE + "name", {"Colour": "red"}, TEXT)
-    yield Rule("the interfaces' versions are told", "free", "GET", "/management/apiversions", {}, exactly([1]))
-    yield Rule("the server is told", "free", "GET", "/management/v1/description", {}, kind(dict))
-    yield Rule("the devices are told", "free", "GET", "/management/v1/configureddevices", {}, kind(list))
+        yield put("a boolean is True or False", "tracking", BAD, {"Tracking": text})
+    yield get("what nobody asked for is ignored", "name", TEXT, {"Colour": "red"})
+    yield get("the interfaces' versions are told", "/management/apiversions", exactly([1]))
+    yield get("the server is told", "/management/v1/description", kind(dict))
+    yield get("the devices are told", "/management/v1/configureddevices", kind(list))
 
 
 def numbers() -> Iterator[Rule]:
     for text in NO_NUMBERS:
-        given = {"Axis": 0, "Rate": text}
-        yield Rule("a number is written as a number", "free", "PUT", BASE + "moveaxis", given, BAD)
-        given = {"TargetDeclination": text}
-        yield Rule("a number is written as a number", "free", "PUT", BASE + "targetdeclination", given, BAD)
+        yield put("a number is written as a number", "moveaxis", BAD, {"Axis": 0, "Rate": text})
+        yield put("a number is written as a number", "targetdeclination", BAD, {"TargetDeclination": text})
     for text in ("1.0", "1e0", "99999999999", *NO_NUMBERS):
-        yield Rule("an axis is a whole number", "free", "GET", BASE + "canmoveaxis", {"Axis": text}, BAD)
+        yield get("an axis is a whole number", "canmoveaxis", BAD, {"Axis": text})
     for text in ("5", "+5", "5.", "5.0", ".5e1", "5e0", "5E+0", "005"):
-        given = {"TargetDeclination": text}
-        yield Rule("a number may be written so", "free", "PUT", BASE + "targetdeclination", given)
+        yield put("a number may be written so", "targetdeclination", given={"TargetDeclination": text})
+    slew, star = "slewtocoordinatesasync", {"RightAscension": 5, "Declination": 20}
     for name, values in {"RightAscension": (-0.001, 24.001, 1e300), "Declination": (-90.001, 90.001, -1e300)}.items():
         for value in values:
-            given, target = {"RightAscension": 5, "Declination": 20} | {name: value}, f"target{name.lower()}"
-            slew = BASE + "slewtocoordinatesasync"
-            yield Rule("a place on the sky is within its range", "tracking", "PUT", slew, given, INVALID_VALUE)
-            one = {f"Target{name}": value}
-            yield Rule("a target is within its range", "free", "PUT", BASE + target, one, INVALID_VALUE)
-    for given in ({"Azimuth": -1, "Altitude": 45}, {"Azimuth": 361, "Altitude": 45}, {"Azimuth": 0, "Altitude": 91}):
-        slew = BASE + "slewtoaltazasync"
-        yield Rule("a direction is within its range", "free", "PUT", slew, given, INVALID_VALUE)
-    for name in ("RightAscension", "Declination"):
-        yield Rule("every parameter is given", "tracking", "PUT", BASE + "slewtocoordinatesasync", {name: 5}, BAD)
-        target = BASE + f"target{name.lower()}"
-        yield Rule("a target that was not set is none", "free", "GET", target, {}, NOT_SET)
+            yield put("a place is within its range", slew, INVALID_VALUE, star | {name: value}, "tracking")
+            yield put("a target is within its range", f"target{name.lower()}", INVALID_VALUE, {f"Target{name}": value})
+        yield put("every parameter is given", slew, BAD, {name: 5}, "tracking")
+        yield get("a target that was not set is none", f"target{name.lower()}", NOT_SET)
+    for azimuth, altitude in ((-1, 45), (361, 45), (0, 91)):
+        given = {"Azimuth": azimuth, "Altitude": altitude}
+        yield put("a direction is within its range", "slewtoaltazasync", INVALID_VALUE, given)
 
 
 def behaviour() -> Iterator[Rule]:
-    yield Rule("it goes nowhere without a target", "tracking", "PUT", BASE + "slewtotargetasync", {}, NOT_SET)
+    yield put("it goes nowhere without a target", "slewtotargetasync", NOT_SET, state="tracking")
     star, place = {"RightAscension": 0, "Declination": 80}, {"Azimuth": 180, "Altitude": 45}
-    slew, turn = BASE + "slewtocoordinatesasync", BASE + "slewtoaltazasync"
-    yield Rule("to a star it goes while it tracks", "tracking", "PUT", slew, star)
-    yield Rule("to a star it does not go while it rests", "free", "PUT", slew, star, INVALID_OPERATION)
-    yield Rule("to a direction it goes while it rests", "free", "PUT", turn, place)
-    yield Rule("to a direction it does not go while it tracks", "tracking", "PUT", turn, place, INVALID_OPERATION)
-    below = {"Azimuth": 180, "Altitude": -5}
-    yield Rule("it does not go below its horizon", "free", "PUT", turn, below, INVALID_OPERATION)
-    parked = {
-        "slewtocoordinatesasync": star, "slewtoaltazasync": place, "abortslew": {}, "tracking": {"Tracking": True},
-        "moveaxis": {"Axis": 0, "Rate": 1},
-    }  # fmt: skip
-    for name, given in parked.items():
-        yield Rule("parked it does not move", "parked", "PUT", BASE + name, given, PARKED)
-    yield Rule("parked it may be parked again", "parked", "PUT", BASE + "park")
-    yield Rule("parked it may be unparked", "parked", "PUT", BASE + "unpark")
-    yield Rule("unparked it may be unparked again", "free", "PUT", BASE + "unpark")
-    yield Rule("parked it says so", "parked", "GET", BASE + "atpark", {}, YES)
-    yield Rule("parked it does not track", "parked", "GET", BASE + "tracking", {}, NO)
-    yield Rule("parked it does not slew", "parked", "GET", BASE + "slewing", {}, NO)
-    yield Rule("tracking it says so", "tracking", "GET", BASE + "tracking", {}, YES)
+    slew, turn = "slewtocoordinatesasync", "slewtoaltazasync"
+    yield put("to a star it goes while it tracks", slew, given=star, state="tracking")
+    yield put("to a star it does not go while it rests", slew, INVALID_OPERATION, star)
+    yield put("to a direction it goes while it rests", turn, given=place)
+    yield put("to a direction it does not go while it tracks", turn, INVALID_OPERATION, place, "tracking")
+    yield put("it does not go below its horizon", turn, INVALID_OPERATION, {"Azimuth": 180, "Altitude": -5})
+    parked = {slew: star, turn: place, "abortslew": {}, "tracking": {"Tracking": True}}
+    for name, given in (parked | {"moveaxis": {"Axis": 0, "Rate": 1}}).items():
+        yield put("parked it does not move", name, PARKED, given, "parked")
+    yield put("parked it may be parked again", "park", state="parked")
+    yield put("parked it may be unparked", "unpark", state="parked")
+    yield put("unparked it may be unparked again", "unpark")
+    for name, wanted in {"atpark": YES, "tracking": NO, "slewing": NO}.items():
+        yield get("parked it says so, and does not move", name, wanted, state="parked")
+    yield get("tracking it says so", "tracking", YES, state="tracking")
     for axis, moves in ((0, YES), (1, YES), (2, NO)):
-        yield Rule("an axis moves or does not", "free", "GET", BASE + "canmoveaxis", {"Axis": axis}, moves)
+        yield get("an axis moves or does not", "canmoveaxis", moves, {"Axis": axis})
         rates = exactly([]) if axis == 2 else lambda value: value[0]["Maximum"] > value[0]["Minimum"] >= 0
-        yield Rule(
-            "its rates are told, none where it does not move", "free", "GET", BASE + "axisrates", {"Axis": axis}, rates
-        )
+        yield get("its rates are told, none where it does not move", "axisrates", rates, {"Axis": axis})
     for axis in (-1, 3):
         for name in ("canmoveaxis", "axisrates"):
-            yield Rule("there are three axes", "free", "GET", BASE + name, {"Axis": axis}, INVALID_VALUE)
-        given = {"Axis": axis, "Rate": 0}
-        yield Rule("there are three axes", "free", "PUT", BASE + "moveaxis", given, INVALID_VALUE)
+            yield get("there are three axes", name, INVALID_VALUE, {"Axis": axis})
+        yield put("there are three axes", "moveaxis", INVALID_VALUE, {"Axis": axis, "Rate": 0})
     for rate in (2.001, -2.001, 1e300):
-        given = {"Axis": 0, "Rate": rate}
-        yield Rule("a rate is one of those told", "free", "PUT", BASE + "moveaxis", given, INVALID_VALUE)
+        yield put("a rate is one of those told", "moveaxis", INVALID_VALUE, {"Axis": 0, "Rate": rate})
     for rate in (2, -2, 0):
-        yield Rule("a rate of those told is taken", "free", "PUT", BASE + "moveaxis", {"Axis": 1, "Rate": rate})
-    given = {"Axis": 2, "Rate": 1}
-    yield Rule("an axis that is not there does not move", "free", "PUT", BASE + "moveaxis", given, INVALID_VALUE)
-    yield Rule("the stars' rate is offered", "free", "PUT", BASE + "trackingrate", {"TrackingRate": 0})
+        yield put("a rate of those told is taken", "moveaxis", given={"Axis": 1, "Rate": rate})
+    yield put("an axis that is not there does not move", "moveaxis", INVALID_VALUE, {"Axis": 2, "Rate": 1})
+    yield put("the stars' rate is offered", "trackingrate", given={"TrackingRate": 0})
     for rate in (1, 2, 3, -1, 9):
-        given = {"TrackingRate": rate}
-        yield Rule("no other rate is", "free", "PUT", BASE + "trackingrate", given, INVALID_VALUE)
-    given = {"Action": "dance", "Parameters": ""}
-    yield Rule("an action that is not offered is none", "free", "PUT", BASE + "action", given, NO_ACTION)
-    yield Rule("an abort at rest does nothing", "free", "PUT", BASE + "abortslew")
-    yield Rule("without a connection it does not move", "disconnected", "PUT", BASE + "park", {}, NOT_CONNECTED)
-    yield Rule("connecting is done at once", "disconnected", "PUT", BASE + "connect")
-    yield Rule("disconnecting is done at once", "free", "PUT", BASE + "disconnect")
+        yield put("no other rate is", "trackingrate", INVALID_VALUE, {"TrackingRate": rate})
+    yield put("an action that is not offered is none", "action", NO_ACTION, {"Action": "dance", "Parameters": ""})
+    yield put("an abort at rest does nothing", "abortslew")
+    yield put("without a connection it does not move", "park", NOT_CONNECTED, state="disconnected")
+    yield put("connecting is done at once", "connect", state="disconnected")
+    yield put("disconnecting is done at once", "disconnect")
 
 
 RULES = [*members(), *requests(), *numbers(), *behaviour()]

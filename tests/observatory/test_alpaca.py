@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from math import degrees
@@ -15,7 +16,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
-from alpaca_mount import ARCSEC, server, telescope, until
+from alpaca_mount import ARCSEC, simulated, until
 from alpaca_rules import BASE
 from mortal import mortal
 from test_alpaca_rules import ask
@@ -32,10 +33,27 @@ from cosim_observatory.pointing import HORIZON, DeviceError, Pointing
 from cosim_observatory.sky import equatorial, horizontal, sidereal_time
 from cosim_observatory.telescope import HOURS, TURN, Telescope, _hours
 
-__all__ = ["server", "telescope"]
-
 PATIENCE = 300.0
 """Seconds after which what does not happen is an error; what is waited for is always a condition."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with simulated() as mount, Server(mount, port=0, discovery=0) as one:
+        yield one
+
+
+@pytest.fixture
+def telescope(server: Server) -> Iterator[Any]:
+    """The client's telescope, connected, unparked, at rest, not tracking."""
+    alpaca = pytest.importorskip("alpaca.telescope", reason="alpyca is not installed (pip install '.[alpaca]')")
+    one = alpaca.Telescope(f"127.0.0.1:{server.port}", 0)
+    one.Connected = True
+    until(lambda: not one.Slewing)
+    one.Unpark()
+    one.Tracking = False
+    yield one
+    until(lambda: not one.Slewing)
 
 
 def axis(number: int) -> Any:
@@ -171,14 +189,6 @@ def test_clients_find_the_server_and_its_device(
     assert (device["DeviceType"], device["DeviceNumber"]) == ("Telescope", 0)
 
 
-def test_transactions_are_counted(server: Server) -> None:
-    first, second = (
-        json.loads(ask(server, "GET", f"{BASE}connected", {"CLIENTTRANSACTIONID": 7})[1]) for _ in range(2)
-    )
-    assert first["ClientTransactionID"] == 7
-    assert second["ServerTransactionID"] == first["ServerTransactionID"] + 1
-
-
 def test_a_port_that_is_taken_and_a_scenario_without_a_star_are_refused(server: Server) -> None:
     with pytest.raises(OutputError, match=f"Port {server.port} of 127.0.0.1 cannot be served: address already in use"):
         Server(server.telescope, port=server.port)
@@ -261,20 +271,15 @@ def test_an_angle_that_rounds_to_24_hours_is_0_hours() -> None:
     assert _hours(TURN / 2) == TURN / 2 * HOURS
 
 
-def test_whatever_bytes_come_the_server_goes_on(server: Server) -> None:
+def test_whatever_bytes_come_the_server_goes_on_and_counts_its_answers(server: Server) -> None:
     random = np.random.default_rng(6)
-    heads = (
-        b"GET /api/v1/telescope/0/%s HTTP/1.1\r\n\r\n",
-        b"PUT /api/v1/telescope/0/%s HTTP/1.1\r\nContent-Length: %s\r\n\r\n",
-    )
-    for trial in range(40):
+    heads = (b"%s", b"GET %s HTTP/1.1\r\n\r\n", b"PUT %s HTTP/1.1\r\nContent-Length: 9999999\r\n\r\n")
+    for head in (*heads, b"PUT /api/v1/telescope/0/tracking HTTP/1.1\r\nContent-Length: %s\r\n\r\n") * 10:
         noise = random.integers(1, 256, int(random.integers(0, 60)), dtype=np.uint8).tobytes()
-        text = (noise, heads[0] % noise, heads[1] % (b"tracking", noise), heads[1] % (b"tracking", b"9999999"))[
-            trial % 4
-        ]
         with socket.create_connection(("127.0.0.1", server.port), timeout=5) as wire:
-            wire.sendall(text)
+            wire.sendall(head % noise)
             wire.shutdown(socket.SHUT_WR)
-            answer = wire.recv(1000)
-        assert b" 500 " not in answer.partition(b"\r\n")[0]
-    assert ask(server, "GET", f"{BASE}name", {})[0] == 200
+            assert b" 500 " not in wire.recv(1000).partition(b"\r\n")[0]
+    first, second = (json.loads(ask(server, "GET", f"{BASE}name", {"CLIENTTRANSACTIONID": 7})[1]) for _ in range(2))
+    assert first["ClientTransactionID"] == 7
+    assert second["ServerTransactionID"] == first["ServerTransactionID"] + 1

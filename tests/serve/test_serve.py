@@ -7,28 +7,10 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
-from urllib.parse import quote
 
 import pytest
 from mortal import mortal
-from serving import (
-    CARD,
-    HERE,
-    ORIGIN,
-    TOKEN,
-    _path,
-    act,
-    alive,
-    client,
-    client_of,
-    desk,
-    id_of,
-    new,
-    put,
-    ready,
-    recording,
-    until,
-)
+from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording, until
 from serving import state as state_of
 from starlette.testclient import TestClient
 
@@ -41,7 +23,6 @@ from cosim_serve.job import Upload
 from cosim_serve.server import listening
 from cosim_serve.work import Order, command, diagnose_order
 
-__all__ = ["_path", "client", "desk"]
 POSIX = pytest.mark.skipif(os.name != "posix", reason="modes and /proc")
 
 
@@ -206,13 +187,14 @@ def test_the_browser_is_opened_with_a_file_that_its_owner_alone_can_read_and_tha
 
 
 @POSIX
-def test_what_lies_at_the_place_of_that_file_is_not_followed(tmp_path: Path) -> None:
+def test_the_file_leads_to_the_address_by_hand_too_and_what_lies_at_its_place_is_not_followed(tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.write_text("kept", "utf-8")
     (tmp_path / NAME).symlink_to(other)
-    with door(tmp_path, "http://127.0.0.1:1/?token=x") as path:
+    with door(tmp_path, "http://127.0.0.1:1/?token=a&b") as path:
         assert path is not None
         assert not path.is_symlink()
+        assert re.search(r'href="http://127\.0\.0\.1:1/\?token=a&amp;b"', path.read_text("utf-8"))
     assert other.read_text("utf-8") == "kept"
     with door(tmp_path / "nowhere", "http://127.0.0.1:1/?token=x") as path:
         assert path is None
@@ -256,13 +238,6 @@ def test_what_the_page_makes_is_closed_to_others(tmp_path: Path, desk: Desk) -> 
     made.queue.close()
 
 
-@POSIX
-def test_the_file_leads_to_the_address_also_by_hand(tmp_path: Path) -> None:
-    with door(tmp_path, "http://127.0.0.1:1/?token=a&b") as path:
-        assert path is not None
-        assert re.search(r'href="http://127\.0\.0\.1:1/\?token=a&amp;b"', path.read_text("utf-8"))
-
-
 # The diagnosis itself
 
 
@@ -295,14 +270,6 @@ def test_a_diagnosis_names_files_as_the_user_knows_them(tmp_path: Path) -> None:
         diagnose_order(order)
 
 
-def test_a_file_with_signs_in_its_name_arrives(client: TestClient, desk: Desk) -> None:
-    job = new(client)
-    name = "Lauf #1 & 50% + Übung.csv"
-    assert client.put(f"{job}/files?name={quote(name)}", content=recording()).status_code == 201
-    assert state_of(desk, job).uploads[0].name == name
-    assert ORIGIN
-
-
 # First steps on the page: an example to try, a card from the recordings.
 
 
@@ -320,26 +287,18 @@ def test_the_example_is_a_draft_that_lacks_nothing(client: TestClient, desk: Des
 def test_a_card_is_estimated_from_the_recordings(client: TestClient, desk: Desk) -> None:
     job = new(client)
     assert "there is none yet" in act(client, job, "estimate").text
-    put(client, job, "one.csv", example.recordings()[example.NAMES[0]].encode())
-    assert "The end of the only recording is for validation" in client.get(job).text
-    act(client, job, "estimate")
-    text = desk.card_text(desk.store.get(id_of(job)))
-    inertia = float(re.findall(r"^inertia = ([\d.]+)", text, re.MULTILINE)[0])
-    assert inertia == pytest.approx(example.INERTIA, rel=0.05)
-    assert desk.lacking(desk.store.get(id_of(job))) == []
-
-
-def test_what_is_dropped_and_tells_nothing_is_a_sentence(client: TestClient) -> None:
-    job = new(client)
     put(client, job, "rest.csv", b"t,tau,q\n" + b"".join(b"%.2f,0,0\n" % (k / 100) for k in range(400)))
     assert "No card can be estimated: " in act(client, job, "estimate").text
-
-
-def test_the_last_of_several_recordings_proves_where_none_was_chosen(client: TestClient) -> None:
-    job = new(client)
-    for name in ("a.csv", "b.csv"):
-        put(client, job, name, example.recordings()[example.NAMES[0]].encode())
-    assert "b.csv, the last one, is for validation" in client.get(job).text
+    act(client, job, "drop", file="rest.csv")
+    moving = example.recordings()[example.NAMES[0]].encode()
+    put(client, job, "one.csv", moving)
+    assert "The end of the only recording is for validation" in client.get(job).text
+    act(client, job, "estimate")
+    inertia = float(re.findall(r"^inertia = ([\d.]+)", desk.card_text(state_of(desk, job)), re.MULTILINE)[0])
+    assert inertia == pytest.approx(example.INERTIA, rel=0.05)
+    assert desk.lacking(state_of(desk, job)) == []
+    put(client, job, "two.csv", moving)
+    assert "two.csv, the last one, is for validation" in client.get(job).text
 
 
 def test_no_room_on_the_disk_is_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

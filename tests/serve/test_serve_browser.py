@@ -19,7 +19,6 @@ from serving import (  # skips without the extra [serve]
     CARD,
     HERE,
     TOKEN,
-    _path,
     act,
     client_of,
     desk_at,
@@ -33,7 +32,7 @@ from serving import (  # skips without the extra [serve]
 
 from cosim_serve.desk import Desk
 
-__all__ = ["_path", "browser"]
+__all__ = ["browser"]
 Page = Any
 FIRST = 3.0
 """Processor until the first answer for the demo's files, in units of the time that the diagnosis itself takes: it works

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 import serve_work
 from report_example import diagnosis
-from serving import CARD, _path, act, client_of, desk_at, id_of, new, put, ready, recording, until
+from serving import CARD, act, client_of, desk_at, id_of, new, put, ready, recording, until
 from starlette.testclient import TestClient
 
 from cosim_serve import comparison
 from cosim_serve.chart import HEIGHT, LEFT, WIDTH, chart, ticks
 from cosim_serve.desk import Desk
-
-__all__ = ["_path"]
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 import serve_work
-from serving import _path, act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, until
+from serving import act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, until
 from serving import state as state_of
 
 from cosim.support.errors import InputError
@@ -21,16 +21,27 @@ from cosim_serve import connection
 from cosim_serve.desk import Desk
 from cosim_serve.uploads import Limits
 
-__all__ = ["_path"]
 FEW = Limits(files=3, job=60_000, file=40_000)
+
+
+@contextmanager
+def served(home: Path, work: Any, limits: Limits | None = None) -> Iterator[tuple[Desk, int]]:
+    with desk_at(home, work, limits) as desk, listened(desk) as port:
+        yield desk, port
+        while LINES:
+            LINES.pop().close()
 
 
 @pytest.fixture
 def there(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
-    with desk_at(tmp_path / "data", serve_work.quickly) as desk, listened(desk) as port:
-        yield desk, port
-        while LINES:
-            LINES.pop().close()
+    with served(tmp_path / "data", serve_work.quickly) as made:
+        yield made
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
+    with served(tmp_path / "data", serve_work.for_ever, FEW) as made:
+        yield made
 
 
 LINES: list[socket.socket] = []
@@ -80,33 +91,23 @@ def test_many_connections_that_say_nothing_do_not_silence_the_page(
     assert [one for one in caplog.records if one.levelno > logging.INFO] == []
 
 
-def test_a_head_that_does_not_end_is_ended(there: tuple[Desk, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    _, port = there
-    monkeypatch.setattr(connection, "HEAD", 0.5)
-    monkeypatch.setattr(connection, "LOOK", 0.1)
-    slow = line(port, "GET / HTTP/1.1\n")
-
-    def dripped() -> bool:
-        try:
-            slow.sendall(b"X: y\r\n")
-        except OSError:
-            return True
-        return is_ended(slow)
-
-    until(dripped)
-
-
-@pytest.mark.parametrize("how", ["chunked", "stated"])
-def test_a_body_that_does_not_get_on_is_ended_and_leaves_nothing(
-    there: tuple[Desk, int], how: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("said", "part"),
+    [
+        ("", b"X: y\r\n"),
+        ("Transfer-Encoding: chunked\n\n", b"1\r\nx\r\n"),
+        ("Content-Length: 1000000\n\n", b"x"),
+    ],
+    ids=["a head", "chunks", "a body of stated size"],
+)
+def test_what_does_not_get_on_is_ended_and_leaves_nothing(
+    there: tuple[Desk, int], said: str, part: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     desk, port = there
     job = new(client_of(desk))
-    monkeypatch.setattr(connection, "STALLED", 0.5)
-    monkeypatch.setattr(connection, "LOOK", 0.1)
-    size = "Transfer-Encoding: chunked\n\n" if how == "chunked" else "Content-Length: 1000000\n\n"
-    slow = line(port, head_of(port, "PUT", f"{job}/files?name=a.csv") + size)
-    part = b"1\r\nx\r\n" if how == "chunked" else b"x"
+    for name, seconds in {"HEAD": 0.5, "STALLED": 0.5, "LOOK": 0.1}.items():
+        monkeypatch.setattr(connection, name, seconds)
+    slow = line(port, head_of(port, "PUT", f"{job}/files?name=a.csv") + said)
 
     def dripped() -> bool:
         try:
@@ -201,14 +202,6 @@ class Upload:
         self.line.close()
         head, _, body = text.partition(b"\r\n\r\n")
         return int(head.split()[1]), json.loads(body).get("problem", "")
-
-
-@pytest.fixture
-def slow(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
-    with desk_at(tmp_path / "data", serve_work.for_ever, FEW) as desk, listened(desk) as port:
-        yield desk, port
-        while LINES:
-            LINES.pop().close()
 
 
 def together(work: Callable[[int], None], count: int) -> None:

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from serving import CARD, _path, act, client, desk, id_of, new, put, ready, recording, until
+from serving import CARD, act, id_of, new, put, ready, recording, until
 from serving import state as state_of
 from starlette.testclient import TestClient
 
 from cosim_serve.desk import Desk
 
-__all__ = ["_path", "client", "desk"]
 FINDING = {"what": "cogging", "size": "", "range": "", "answer": "", "kind": "", "statement": "", "action": ""}
 
 

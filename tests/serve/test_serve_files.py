@@ -8,22 +8,7 @@ import numpy as np
 import pytest
 import serve_work
 from damages import damaged
-from serving import (
-    CARD,
-    HERE,
-    _path,
-    act,
-    client,
-    client_of,
-    desk,
-    desk_at,
-    id_of,
-    kept,
-    new,
-    put,
-    ready,
-    recording,
-)
+from serving import CARD, HERE, act, client_of, desk_at, id_of, kept, new, put, ready, recording
 from serving import state as state_of
 from starlette.testclient import TestClient
 
@@ -33,8 +18,6 @@ from cosim_serve.looks import HEIGHT, WIDTH, line
 from cosim_serve.uploads import Limits, safe_name
 from cosim_serve.work import command, job_order
 from pyfmi_models.card import parse_card
-
-__all__ = ["_path", "client", "desk"]
 
 SMALL = Limits(file=20_000, job=50_000, files=4, card=300, form=2_000)
 DAMAGES = 20
@@ -65,13 +48,15 @@ def test_what_is_no_name_is_refused(given: str) -> None:
         safe_name(given, 60)
 
 
-def test_a_path_in_a_name_leads_nowhere_else(client: TestClient, desk: Desk, tmp_path: Path) -> None:
-    job = new(client)
-    for name in ("../../../run.csv", "..%2f..%2frun2.csv", "..\\run3.csv"):
+def test_a_name_may_have_any_signs_and_a_path_in_it_leads_nowhere_else(
+    client: TestClient, desk: Desk, tmp_path: Path
+) -> None:
+    job, signs = new(client), "Lauf #1 & 50% + Übung.csv"
+    for name in ("../../../run.csv", "..%2f..%2frun2.csv", "..\\run3.csv", signs):
         put(client, job, name, recording())
-    inside = desk.store.home.rglob("run*.csv")
-    assert all(one.parent == desk.store.home / id_of(job) / "recordings" for one in inside)
+    assert {one.parent for one in desk.store.home.rglob("*.csv")} == {desk.store.home / id_of(job) / "recordings"}
     assert [one.name for one in tmp_path.iterdir()] == ["data"]
+    assert state_of(desk, job).uploads[-1].name == signs
 
 
 @pytest.mark.parametrize("path", ["../job.json", "..%2fjob.json", "%2e%2e/job.json", "card.toml", "/etc/passwd"])
@@ -89,24 +74,16 @@ def test_a_job_that_is_not_there_is_a_sentence(client: TestClient, name: str) ->
 def test_too_much_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
     with desk_at(tmp_path / "data", serve_work.quickly, SMALL) as desk:
         client = client_of(desk)
-        job = new(client)
+        job, content = new(client), recording(300)
         stated = put(client, job, "large.csv", b"x" * 20_001)
         silent = client.put(f"{job}/files?name=large.csv", content=iter([b"x" * 15_000] * 3))
         for answer in (stated, silent):
             assert answer.status_code == 400
             assert "too large: at most 20 kB" in answer.json()["problem"]
-        assert kept(desk) == []
         assert put(client, job, "axis.toml", CARD.encode() + b"#" * 300).status_code == 400
         assert act(client, job, "card", text="x" * 301).status_code == 400
         assert act(client, job, "card", text="x" * 3000).status_code == 400
         assert kept(desk) == []
-
-
-def test_a_job_takes_so_many_files_and_bytes_and_no_name_twice(tmp_path: Path) -> None:
-    with desk_at(tmp_path / "data", serve_work.quickly, SMALL) as desk:
-        client = client_of(desk)
-        job = new(client)
-        content = recording(300)
         for number in range(4):
             assert put(client, job, f"run{number}.csv", content).status_code == 201
         assert "at most 4 recordings" in put(client, job, "run4.csv", content).json()["problem"]
@@ -190,21 +167,16 @@ def test_columns_and_units_are_corrected(client: TestClient, desk: Desk) -> None
     assert client.get(job).status_code == 200
 
 
-def test_the_names_that_a_card_gives_to_columns_hold(client: TestClient, desk: Desk) -> None:
-    job = new(client)
-    put(client, job, "run.csv", recording().replace(b"t,tau,q", b"t,alpha,beta"))
-    assert desk.views(state_of(desk, job))["run.csv"]["refused"]
-    put(client, job, "axis.toml", (CARD + '[columns]\ntau = "alpha"\nq = "beta"\n').encode())
-    assert not desk.views(state_of(desk, job))["run.csv"]["refused"]
-
-
 def test_a_card_that_is_wrong_is_kept_with_its_sentence_and_can_be_mended(client: TestClient, desk: Desk) -> None:
     job = new(client)
     put(client, job, "axis.toml", CARD.replace("inertia", "inertai").encode())
     page = client.get(job).text
     assert "inertai is not a key of a card" in page
     assert "inertai = 30.0" in page
-    act(client, job, "card", text=CARD)
+    put(client, job, "run.csv", recording().replace(b"t,tau,q", b"t,alpha,beta"))
+    assert desk.views(state_of(desk, job))["run.csv"]["refused"]
+    act(client, job, "card", text=CARD + '[columns]\ntau = "alpha"\nq = "beta"\n')
+    assert not desk.views(state_of(desk, job))["run.csv"]["refused"], "names that a card gives to columns hold"
     assert desk.card_view(state_of(desk, job))["facts"]["machine"] == "azimuth"
     act(client, job, "card", shipped="paper_mount")
     assert desk.card_view(state_of(desk, job))["facts"]["friction"].startswith("lugre")
@@ -273,9 +245,9 @@ def test_what_is_missing_is_said_in_one_sentence_each(client: TestClient) -> Non
 # A file of several recordings: each is listed, read and used by itself, and the file is there once.
 
 
-def day(runs: int = 3) -> bytes:
+def day() -> bytes:
     """Recordings below each other, told apart by a column."""
-    parts = [recording(seed=run).decode().splitlines()[1:] for run in range(runs)]
+    parts = [recording(seed=run).decode().splitlines()[1:] for run in range(3)]
     return "\n".join(["run,t,tau,q", *(f"{run},{row}" for run, rows in enumerate(parts) for row in rows)]).encode()
 
 
@@ -286,22 +258,23 @@ def test_each_recording_of_a_file_is_an_entry_that_waits_for_its_use(client: Tes
     assert [one.name for one in uploads] == [f"day.csv:run={run}" for run in range(3)]
     assert {one.role for one in uploads} == {"out"}
     assert sum(one.size for one in uploads) <= len(day()) + len(uploads)
-    views = desk.views(state_of(desk, job))
-    assert all(not view["problem"] and view["columns"] for view in views.values())
     page = client.get(job).text
     assert "day.csv:run=2" in page
     assert "Choose at least one recording to fit." in page
-
-
-def test_what_is_corrected_in_one_holds_for_the_file(client: TestClient, desk: Desk) -> None:
-    job = new(client)
-    put(client, job, "day.csv", day())
+    # What is corrected in one holds for the file, its use for itself.
     act(client, job, "correct", file="day.csv:run=1", role="train", **{"units.q": "deg"})
-    first, second, third = state_of(desk, job).uploads
-    assert [one.role for one in (first, second, third)] == ["out", "train", "out"]
-    views = desk.views(state_of(desk, job))
-    assert all(one.options["units"] == {"q": "deg"} for one in (first, second, third))
-    assert all(view["columns"][1]["unit"] == "rad" for view in views.values())
+    uploads, views = state_of(desk, job).uploads, desk.views(state_of(desk, job)).values()
+    assert [one.role for one in uploads] == ["out", "train", "out"]
+    assert [one.options["units"] for one in uploads] == [{"q": "deg"}] * 3
+    assert [(view["problem"], view["columns"][1]["unit"]) for view in views] == [("", "rad")] * 3
+    # The file goes with the last of them.
+    path = desk.store.recording(state_of(desk, job), "day.csv")
+    assert "There is a recording day.csv already" in put(client, job, "day.csv", day()).json()["problem"]
+    for run in range(3):
+        assert path.exists()
+        act(client, job, "drop", file=f"day.csv:run={run}")
+    assert not path.exists()
+    assert state_of(desk, job).uploads == ()
 
 
 def test_they_are_diagnosed_and_the_command_line_takes_the_same(client: TestClient, desk: Desk) -> None:
@@ -317,18 +290,6 @@ def test_they_are_diagnosed_and_the_command_line_takes_the_same(client: TestClie
         "cosim diagnose day.csv:run=0 --heldout day.csv:run=2 --card axis.toml --columns day.csv:tau=tau "
         "--units day.csv:tau=mN.m --out result"
     )
-
-
-def test_the_file_goes_with_the_last_of_its_recordings(client: TestClient, desk: Desk) -> None:
-    job = new(client)
-    put(client, job, "day.csv", day(2))
-    path = desk.store.recording(state_of(desk, job), "day.csv")
-    assert "There is a recording day.csv already" in put(client, job, "day.csv", day()).json()["problem"]
-    act(client, job, "drop", file="day.csv:run=0")
-    assert path.exists()
-    act(client, job, "drop", file="day.csv:run=1")
-    assert not path.exists()
-    assert state_of(desk, job).uploads == ()
 
 
 def test_more_than_there_is_room_for_is_a_sentence(tmp_path: Path) -> None:
