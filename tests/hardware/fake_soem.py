@@ -15,7 +15,7 @@ UP = {("disabled", 6): "ready", ("ready", 7): "on", ("on", 15): "enabled", ("ena
 class Slave:
     """The drive; its axis rests."""
 
-    def __init__(self) -> None:
+    def __init__(self, refused: tuple[int, int] | None = None) -> None:
         self.objects: dict[tuple[int, int], bytes] = {}
         self.output = self.input = b""
         self.state, self.al_status, self.drive = PREOP_STATE, 0, "fault"
@@ -23,7 +23,7 @@ class Slave:
         self.sync: tuple[bool, int] | None = None
         self.config_func: Callable[[int], None] | None = None
         self.before, self.mode, self.seen = 0, 0, {}
-        self.refused: tuple[int, int] | None = None
+        self.refused = refused
         self.written: list[tuple[int, int, bytes]] = []
 
     def sdo_write(self, index: int, subindex: int, data: bytes) -> None:
@@ -77,11 +77,12 @@ class Master:
     last: "Master"
     count = 1
     goes_up = True
+    refused: tuple[int, int] | None = None
     change: Callable[["Master", int], Any] | None = None
 
     def __init__(self) -> None:
         type(self).last = self
-        self.slaves = [Slave() for _ in range(self.count)]
+        self.slaves = [Slave(self.refused) for _ in range(self.count)]
         self.expected_wkc, self.wkc, self.cycles, self.closed, self.state = 3, 3, 0, False, INIT_STATE
         self.states: list[int] = []
         self.told: list[tuple[object, ...]] = []

@@ -71,15 +71,11 @@ def test_words_stand_in_the_order_of_the_headers() -> None:
 
 
 @pytest.mark.parametrize("bits", [0, 1, 0b1010_0000_0000_0001, 0xFFFF])
-def test_a_word_of_faults_is_one_name_a_bit(bits: int) -> None:
+def test_a_word_of_faults_is_one_name_a_bit_and_each_head_has_four_bits_of_reasons(bits: int) -> None:
     names = list(words.FAULTS)
     assert words.faults_of(bits) == tuple(names[place] for place in range(16) if bits & 2**place)
-
-
-def test_each_head_has_four_bits_of_reasons() -> None:
-    assert words.heads_of(0) == {}
-    assert words.heads_of(0x0123) == {0: "astray", 1: "frozen", 2: "silent"}
-    assert words.heads_of(0x2000) == {3: "frozen"}
+    reasons = [words.heads_of(word) for word in (0, 0x0123, 0x2000)]
+    assert reasons == [{}, {0: "astray", 1: "frozen", 2: "silent"}, {3: "frozen"}]
 
 
 @pytest.mark.parametrize(("ms", "cycles"), [(1e-9, 1), (0.149, 1), (0.151, 2), (20.0, 200), (20.04, 200)])

@@ -11,12 +11,11 @@ from on_hardware import SIMULATED, recorded, scenario, session
 from cosim.data.recording import Recording
 from cosim.hardware.blackbox import unwrapped
 from cosim.hardware.library import library
-from cosim.hardware.machine import Encoder, Inject, Machine, changed
+from cosim.hardware.machine import Encoder, Inject, Machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import run_session
 from cosim.hardware.structures import CFeedback, CHeads
 from cosim.hardware.words import heads_of
-from cosim.support.errors import HardwareError
 from cosim.system.scenario import Scenario
 
 QUANTUM, ECCENTRIC, APART = 1.4629180792671596e-9, 2e-5, 1e-4
@@ -167,8 +166,3 @@ def test_the_mean_is_rounded_to_the_nearest_count_wherever_the_axis_is_and_halve
     assert sum(offsets) == quarters
     found, _ = combined(at + np.array([[0] * 4, offsets]))
     assert found[1] - found[0] == np.floor(quarters / 4 + 0.5)
-
-
-def test_heads_where_no_wire_brings_them_are_refused() -> None:
-    with pytest.raises(HardwareError, match='heads = 4, and only adapter = "simulated" brings'):
-        changed(SIMULATED, "mine.toml", adapter="udp://127.0.0.1:5000", encoder={"heads": 4})

@@ -88,6 +88,10 @@ BEGUN = 'name = "x"\nadapter = "simulated"\n'
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
+        (
+            f'name = "x"\nadapter = "udp://there:1"\nencoder.heads = 4{LIMITED}',
+            "heads = 4, and only adapter = .simulated",
+        ),
         (BEGUN, '"limits" is missing'),
         (f'name = "x"\nadapter = "wireless"{LIMITED}', "adapter = 'wireless' breaks a rule"),
         (f"{BEGUN}heat = 1{LIMITED}", '"heat" is no key of a machine; keys there are: name'),

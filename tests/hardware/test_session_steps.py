@@ -4,6 +4,7 @@ import re
 import resource
 import socket
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from time import monotonic, sleep
 from types import SimpleNamespace
@@ -60,8 +61,8 @@ def test_a_sign_of_life_is_given_twice_in_the_time_that_it_may_take(limit: int, 
     assert one._session.heartbeat == len(went)
 
 
-def up(after: int) -> Callable[[Any], None]:
-    """The drive follows some cycles after it was asked to."""
+def up(after: int, state: int = 4, faults: int = 0) -> Callable[[Any], None]:
+    """The drive follows some cycles after it was asked to, into a state."""
     asked: list[int] = []
 
     def follow(one: Any) -> None:
@@ -70,61 +71,51 @@ def up(after: int) -> Callable[[Any], None]:
         if one._session.request == ASK_ENABLE:
             asked.append(one._session.tick)
             if len(asked) == after:
-                one.axis.state, one.axis.running, one.axis.entered = 4, 1, one._session.tick
+                one.axis.state, one.axis.faults, one.axis.running = state, faults, int(state == 4)
+                one.axis.entered = one._session.tick
 
     return follow
 
 
-def test_to_enable_takes_a_reset_and_as_many_cycles_as_the_drive_needs() -> None:
-    one = counting(up(9))
-    assert one.enable().running
-    assert one._session.tick == 4 + 2 + 9, "four cycles to look, two for the edge of the reset"
-    assert one.status.state == "operation enabled"
-
-
-@pytest.mark.parametrize(("after", "comes"), [(24, True), (25, False)])
-def test_a_drive_may_be_patient_four_times_and_no_longer(after: int, comes: bool) -> None:
-    """Four steps up to operation of five cycles each, and four cycles beside."""
-    one = counting(up(after))
-    if comes:
+@pytest.mark.parametrize(
+    ("follow", "cycles", "sentence"),
+    [
+        (up(9), 9, ""),
+        (up(24), 24, ""),
+        (up(25), 24, r"test was not enabled: the drive did not follow \(state: switch on disab"),
+        (up(1, 7, 0b101000), 1, r"was not enabled: encoder_stale, overspeed \(state: fault\)"),
+    ],
+    ids=["as soon as it follows", "the longest patience", "no longer", "a fault on the way"],
+)
+def test_to_enable_takes_a_reset_and_as_many_cycles_as_the_drive_needs(
+    follow: Callable[[Any], None], cycles: int, sentence: str
+) -> None:
+    """Its patience is four steps up to operation of five cycles each, and four cycles beside."""
+    one = counting(follow)
+    with pytest.raises(HardwareError, match=sentence) if sentence else nullcontext():
         assert one.enable().running
-        return
-    with pytest.raises(HardwareError, match=r"test was not enabled: the drive did not follow \(state: switch on disab"):
-        one.enable()
-    assert one._session.tick == 4 + 2 + 24
+    assert one._session.tick == 4 + 2 + cycles, "four cycles to look, two for the edge of the reset"
+    assert one.status.state == {9: "operation enabled", 1: "fault"}.get(cycles, one.status.state)
 
 
-def test_a_fault_on_the_way_ends_it_at_once_with_its_name() -> None:
+@pytest.mark.parametrize(
+    ("cycles", "leaves", "last"),
+    [(None, 10**6, 4000), (0, 10**6, 0), (700, 10**6, 700), (2500, 10**6, 2500), (None, 1500, 2000)],
+)
+def test_set_points_are_followed_to_their_end_or_for_some_cycles_while_the_axis_is_in_operation(
+    cycles: int | None, leaves: int, last: int
+) -> None:
+    """To leave operation is noticed after the thousand cycles that it went for."""
+
     def follow(one: Any) -> None:
-        if one._session.request == ASK_RESET:
-            one.axis.faults, one.axis.state = 0, 1
-        if one._session.request == ASK_ENABLE:
-            one.axis.state, one.axis.faults = 7, 0b101000
+        one.axis.running = int(one._session.tick < 40 + leaves)
 
     one = counting(follow)
-    with pytest.raises(HardwareError, match=r"was not enabled: encoder_stale, overspeed \(state: fault\)"):
-        one.enable()
-    assert one._session.tick == 4 + 2 + 1
-
-
-@pytest.mark.parametrize(("cycles", "last"), [(None, 4000), (0, 0), (700, 700), (2500, 2500)])
-def test_set_points_are_followed_to_their_end_or_for_some_cycles(cycles: int | None, last: int) -> None:
-    one = counting()
     one._session.tick = one.axis.entered = 40
     one.axis.running = 1
-    one.track(cycles)
+    assert one.track(cycles).running == (leaves > last)
     assert one._session.tick == 40 + last
     assert max(one.loop.went, default=0) <= 1000, "somebody may want to know how far it is"
-
-
-def test_who_leaves_operation_follows_no_further() -> None:
-    def follow(one: Any) -> None:
-        one.axis.running = int(one._session.tick < 1500)
-
-    one = counting(follow)
-    one.axis.running = 1
-    assert not one.track().running
-    assert one._session.tick == 2000, "noticed after the thousand cycles that it went for"
 
 
 def test_to_disable_lasts_as_long_as_the_ramp_and_two_cycles() -> None:
@@ -236,13 +227,6 @@ def test_a_move_is_right_up_to_a_factor_of_one_and_a_half(
         move.try_move(scenario(), SIMULATED, fast=True)
 
 
-def library_of(calls: list[Any], **also: Any) -> Any:
-    """A library whose functions note that they were called."""
-    names = ("hardware_run", "hardware_release", "hardware_bare")
-    made = {name: lambda *given, name=name: calls.append((name, *given[1:])) for name in names}
-    return lambda: SimpleNamespace(**(made | also))
-
-
 def test_a_loop_in_a_thread_runs_until_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
     session = SimpleNamespace(stop=0)
@@ -253,13 +237,17 @@ def test_a_loop_in_a_thread_runs_until_it_is_stopped(monkeypatch: pytest.MonkeyP
         sleep(0.05)  # its last cycle
         calls.append(("hardware_run", *given[1:]))
 
-    monkeypatch.setattr(loops, "library", library_of(calls, hardware_run=run))
+    def release(*given: Any) -> None:
+        calls.append("released")
+
+    made = SimpleNamespace(hardware_run=run, hardware_release=release)
+    monkeypatch.setattr(loops, "library", lambda: made)
     one = Threaded(session, "sample")  # type: ignore[arg-type]
     one.start()
     one.go(3)
     one.stop()
     assert session.stop == 1
-    assert calls == [("hardware_run", "sample", 2**62), ("hardware_release",)], "no torque once its last cycle is over"
+    assert calls == [("hardware_run", "sample", 2**62), "released"], "no torque once its last cycle is over"
 
 
 def test_a_bare_clock_is_asked_in_nanoseconds_and_answers_in_microseconds(monkeypatch: pytest.MonkeyPatch) -> None:
