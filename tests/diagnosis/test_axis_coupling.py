@@ -1,64 +1,86 @@
-"""A neighbouring axis acts on this one: named where its columns are there and it moves by itself, and only then."""
+"""Neighbouring axes act on this one: each that acts is named where its columns are there and it moves by itself."""
 
+import json
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
-from two_links import WEIGHT, coupling, elbow
+from problems import diagnosed
+from scipy.spatial.transform import Rotation
+from two_links import TIP, WEIGHT, coupling, elbow, forearm, joint, tones, wrist
 
+import cosim.delivery
+from cosim.api.why import Written
 from cosim.data.neighbours import Neighbour, neighbours
+from cosim.data.recording import Recording
+from cosim.delivery.deliver import as_json
 from cosim.diagnosis.answer.result import Diagnosis
-from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.answer.why import reasons
+from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.trust.admission import check_neighbours
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.neighbours import as_inputs, key
 from cosim.estimation.prepare import prepare
 from cosim.support.errors import RecordingError
-from pyfmi_models.card import parse_card
-from pyfmi_models.effects.axis_coupling import AxisCoupling, WeightCoupling
+from cosim_investigation.questions import effect_of
+from pyfmi_models.card import CardError, parse_card
+from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects.axis_coupling import PRODUCTS, ChainCoupling, SpaceCoupling, WeightCoupling
+from pyfmi_models.effects.base import Effect, Motion
+from pyfmi_models.mount import Mount
 
-CARD = """
-[mount]
-name = "elbow"
-inertia = 0.064
-[friction]
-model = "coulomb"
-Fc = 0.15
-sigma2 = 0.08
-"""
+ELBOW, JOINT, WRIST = (
+    f'[mount]\ninertia = {inertia}\n[friction]\nmodel = "coulomb"\nFc = {level}\nsigma2 = {viscous}\n'
+    for inertia, level, viscous in ((0.064, 0.15, 0.08), (0.3, 0.5, 0.3), (0.06, 0.15, 0.08))
+)
+SCHEMA = Path(cosim.delivery.__file__).with_name("schema.json")
+
+
+def coupled(card: str, *keys: str) -> Mount:
+    """The mount of a card with couplings of these keys."""
+    effects = (f'[[effects]]\neffect = "axis_coupling"\n{one}\n' for one in keys)
+    return parse_card(card + "".join(effects), "card.toml").plant()
 
 
 @cache
-def found(neighbour: str, columns: bool = True) -> Diagnosis:
-    runs = [elbow(seed, neighbour, columns=columns) for seed in (1, 2, 3)]
-    return diagnose(runs[:2], runs[2:], parse_card(CARD, "card.toml")).diagnosis
+def of_elbow(neighbour: str, columns: bool = True) -> Diagnosis:
+    return diagnosed([elbow(seed, neighbour, columns=columns) for seed in (1, 2, 3)], ELBOW).diagnosis
+
+
+def of_joint(acting: Mapping[int, tuple[float, float]], **more: float) -> Outcome:
+    return diagnosed([joint(seed, acting, **more) for seed in (1, 2, 3)], JOINT)
 
 
 def test_a_neighbour_whose_columns_are_there_is_named_with_its_inertia_and_its_weight() -> None:
-    (one,) = (finding for finding in found("tones").findings if finding.effect == "axis_coupling")
+    (one,) = (finding for finding in of_elbow("tones").findings if finding.effect == "axis_coupling")
     assert one.answer == "found"
     assert one.parameters["inertia"] == pytest.approx(coupling(), rel=0.15)
     assert one.parameters["weight"] == pytest.approx(WEIGHT, rel=0.15)
     assert (one.parameters["phase"], one.parameters["follows"]) == (pytest.approx(0.0, abs=0.05), 1.0)
     assert "per rad/s² of `q1`" in one.statement
-    held = found("tones").heldout
+    held = of_elbow("tones").heldout
     assert held.after_rms < 0.1 * held.before_rms
 
 
-def test_without_its_columns_it_is_nothing_else_for_sure() -> None:
-    rows = {one.effect: one for one in found("tones", columns=False).findings}
-    assert not [name for name, one in rows.items() if one.answer == "found"]
-    assert (rows["axis_coupling"].answer, rows["axis_coupling"].evidence) == (
-        "not_testable",
-        "no column of a neighbour",
-    )
-
-
-def test_a_neighbour_that_stands_still_does_nothing() -> None:
-    rows = {one.effect: one for one in found("still").findings}
+@pytest.mark.parametrize(
+    ("neighbour", "columns", "evidence", "named"),
+    [
+        pytest.param("tones", False, "no column of a neighbour", set(), id="without its columns nothing is sure"),
+        pytest.param("still", True, "`q1` stands still", {"gravity_unbalance"}, id="at rest the own weight is left"),
+    ],
+)
+def test_a_neighbour_that_is_not_seen_is_not_testable(
+    neighbour: str, columns: bool, evidence: str, named: set[str]
+) -> None:
+    rows = {one.effect: one for one in of_elbow(neighbour, columns).findings}
+    assert {name for name, one in rows.items() if one.answer == "found"} == named
     assert rows["axis_coupling"].answer == "not_testable"
-    assert rows["gravity_unbalance"].answer == "found", "the weight of the elbow alone"
+    assert rows["axis_coupling"].evidence.startswith(evidence)
 
 
 @pytest.mark.parametrize(("name", "is_there"), [("tones", True), ("still", False), ("alike", False)])
@@ -71,10 +93,9 @@ def test_a_neighbour_counts_where_it_moves_by_itself(name: str, is_there: bool) 
 def test_what_was_not_recorded_of_a_neighbour_is_the_derivative_of_what_was() -> None:
     run = elbow(1)
     piece = prepare([run], 15.0).pieces[0]
-    filtered = piece.neighbours[key("q1", "position")]
-    speed = np.gradient(filtered, piece.dt)
+    speed = np.gradient(piece.neighbours[key("q1", "position")], piece.dt)
     np.testing.assert_allclose(piece.neighbours[key("q1", "speed")][5:-5], speed[5:-5], atol=0.02 * np.ptp(speed))
-    fed = as_inputs(run, parse_card(CARD + '[[effects]]\neffect="axis_coupling"\nneighbour="q1"\n', "c").plant(), 15.0)
+    fed = as_inputs(run, coupled(ELBOW, 'neighbour = "q1"'), 15.0)
     assert "neighbour_acceleration" in fed
     assert "neighbour_speed" not in fed, "only what the effect reads"
 
@@ -101,30 +122,194 @@ def test_columns_of_a_neighbour_are_told_by_the_fields_usual_names(
     assert list(neighbours(["t", "tau", "q", *columns], units)) == expected
 
 
-def test_a_sentence_names_the_column_and_the_inputs_are_the_plants() -> None:
-    one = WeightCoupling(inertia=0.12, weight=1.1, follows=0.0, neighbour="q2")
-    said = "0.12 N·m per rad/s² of `q2`, a weight of 1.1 N·m that goes with the angle `q2`."
-    assert one.statement().endswith(said)
-    assert [each.name for each in one.inputs()] == ["neighbour_acceleration", "neighbour_position"]
-    assert one.recorded_as()["neighbour_acceleration"] == "q2 acceleration"
-    assert AxisCoupling(inertia=0.1).recorded_as() == {}
+BOTH = {"weight": 2.0, "neighbour": "a + b"}
 
 
-def test_a_card_that_names_a_column_which_is_not_there_is_refused_with_those_that_are() -> None:
-    plant = parse_card(CARD + '[[effects]]\neffect="axis_coupling"\nneighbour="q7"\n', "card.toml").plant()
-    with pytest.raises(RecordingError, match=r'reads "q7", which this recording lacks; neighbours are: q1\.'):
-        check_neighbours(plant, [elbow(1)])
-    with pytest.raises(RecordingError, match="it has no column of a neighbour"):
-        check_neighbours(plant, [elbow(1, columns=False)])
+@pytest.mark.parametrize(
+    ("effect", "unit", "end"),
+    [
+        (
+            WeightCoupling(inertia=0.12, weight=1.1, follows=0.0, neighbour="q2"),
+            "N·m",
+            "0.12 N·m per rad/s² of `q2`, a weight of 1.1 N·m that goes with the angle `q2`.",
+        ),
+        (ChainCoupling(follows=-1.0, follows_second=-1.0, **BOTH), "N·m", "the angle - this axis + `a` - `b`."),
+        (ChainCoupling(follows=0.0, follows_second=1.0, **BOTH), "N", "of 2 N that goes with the angle `a` + `b`."),
+        (
+            SpaceCoupling(sss=3.0, ccc=-4.0, neighbour="a + b"),
+            "N·m",
+            "a weight of 5 N·m at most that goes with three angles, this axis', `a` and `b`.",
+        ),
+    ],
+)
+def test_a_sentence_names_the_columns_and_says_which_way_they_turn(effect: Effect, unit: str, end: str) -> None:
+    assert effect.statement(unit).endswith(end)
+
+
+@pytest.mark.parametrize(
+    ("keys", "run", "sentence"),
+    [
+        ('neighbour = "q7"', elbow(1), 'reads "q7", which this recording lacks; neighbours are: q1.'),
+        ('neighbour = "q7"', elbow(1, columns=False), "it has no column of a neighbour"),
+        ('weight = 1\nfollows_second = 1\nneighbour = "q1 + q9"', wrist(1), 'reads "q9", which this recording lacks'),
+    ],
+)
+def test_a_card_that_names_a_column_which_is_not_there_is_refused_with_those_that_are(
+    keys: str, run: Recording, sentence: str
+) -> None:
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        check_neighbours(coupled(ELBOW, keys), [run])
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ('weight=1.0\nfollows_second=1.0\nneighbour="q1"', 'neighbour "q1" must name two neighbours, as q2 + q3'),
+        ('weight=1.0\nfollows_second=1.0\nneighbour="a + b + c"', "must name two neighbours"),
+        ('inertia=1.0\nneighbour="q1 + q2"', 'neighbour "q1 + q2" must name one neighbour'),
+    ],
+)
+def test_a_coupling_names_as_many_neighbours_as_it_reads(keys: str, sentence: str) -> None:
+    with pytest.raises(CardError, match=re.escape(sentence)):
+        coupled(ELBOW, keys)
+
+
+def torques(run: Recording, *mounts: Mount) -> list[np.ndarray]:
+    """What each mount needs for the motion of a recording."""
+    pieces = prepare([run], 15.0).pieces
+    return [stacked(Inverse(one, ()), pieces, np.zeros(0))[0] for one in mounts]
 
 
 def test_a_card_without_the_word_reads_the_only_neighbour() -> None:
-    named, bare = (
-        parse_card(CARD + f'[[effects]]\neffect="axis_coupling"\ninertia=0.09\n{more}\n', "c").plant()
-        for more in ('neighbour="q1"', "")
-    )
-    pieces = prepare([elbow(1)], 15.0).pieces
-    torques = [stacked(Inverse(mount, ()), pieces, np.zeros(0))[0] for mount in (named, bare)]
-    np.testing.assert_array_equal(*torques)
-    without = stacked(Inverse(replace(named, effects=()), ()), pieces, np.zeros(0))[0]
-    assert np.ptp(torques[0] - without) > 0.1
+    named, bare = (coupled(ELBOW, f"inertia = 0.09\n{more}") for more in ('neighbour = "q1"', ""))
+    first, second, without = torques(elbow(1), named, bare, replace(named, effects=()))
+    np.testing.assert_array_equal(first, second)
+    assert np.ptp(first - without) > 0.1
+
+
+def test_a_card_with_two_couplings_reads_two_inputs_and_needs_the_sum_of_their_torques() -> None:
+    keys = ['inertia = 0.2\nneighbour = "q1"', 'inertia = 0.05\nneighbour = "q3"']
+    both, *single = coupled(JOINT, *keys), *(coupled(JOINT, one) for one in keys)
+    run = joint(1, {})
+    check_neighbours(both, [run])
+    none, one, other, together = torques(run, replace(both, effects=()), *single, both)
+    np.testing.assert_allclose(together - none, one + other - 2 * none, atol=1e-9)
+    assert np.ptp(other - none) > 0.01
+    inputs = {variable.name: variable.description for variable in both.model().inputs}
+    assert inputs["neighbour_acceleration"] == "Acceleration of the neighbouring axis, `q1`"
+    assert inputs["neighbour_acceleration2"] == "Acceleration of the neighbouring axis, `q3`"
+    alone = [variable.name for variable in single[1].model().inputs]
+    assert alone == ["tau", "disturbance", "neighbour_acceleration"]
+    x, p = np.zeros(2), [variable.start for variable in both.parameters()]
+    speeds = [both.model().equations(0, x, [0, 0, *given], p)[0][1] for given in ((1, 0), (0, 1))]
+    assert [float(one) for one in speeds] == pytest.approx([-0.2 / 0.3, -0.05 / 0.3])
+
+
+def test_each_neighbour_that_acts_is_found_with_its_own_size_and_delivered() -> None:
+    outcome = of_joint({1: (0.2, 1.5), 3: (0.05, 0.0)})
+    answer = outcome.diagnosis
+    named = {one.name: one for one in answer.findings if one.answer == "found"}
+    assert [*named] == ["axis_coupling:q1", "axis_coupling:q3"]
+    assert named["axis_coupling:q1"].parameters["inertia"] == pytest.approx(0.2, rel=0.02)
+    assert named["axis_coupling:q1"].parameters["weight"] == pytest.approx(1.5, rel=0.02)
+    assert named["axis_coupling:q3"].parameters == {"inertia": pytest.approx(0.05, rel=0.05)}
+    assert answer.heldout.after_rms < 0.05 * answer.heldout.before_rms
+    again = parse_card(card_text(outcome.card, ""), "card.toml").plant()
+    assert [one.name for one in again.effects] == [*named]
+
+    document = json.loads(json.dumps(as_json(answer)))
+    jsonschema.validate(document, json.loads(SCHEMA.read_text("utf-8")))
+    assert document["verdict"] == document["delivered"] == ["axis_coupling"]
+    (entry,) = (one for one in document["effects"] if one["effect"] == "axis_coupling")
+    assert (entry["neighbour"], [one["neighbour"] for one in entry["further"]]) == ("q1", ["q3"])
+    said = dict(reasons(document, answer.ledger))
+    assert "fitted together with axis_coupling:q1" in said["axis_coupling:q3"]
+    Written(document, answer.ledger).check("axis_coupling:q3")
+
+
+def test_what_the_equation_of_a_coupling_lacks_makes_no_other_neighbour_a_cause() -> None:
+    runs = []
+    for seed in (1, 2, 3):
+        run = elbow(seed)
+        idle = {f"q{k}": tones(run.t, 100 * k + seed, 0.7).q for k in (3, 4)}
+        runs.append(Recording.of({**run.table, **idle}, run.name))
+    answer = diagnosed(runs, ELBOW).diagnosis
+    assert {one.source for one in answer.findings if one.effect == "axis_coupling" and one.parameters} == {"q1"}
+
+
+def test_neighbours_that_move_and_do_nothing_are_not_named() -> None:
+    answer = of_joint({}).diagnosis
+    assert answer.verdict == ()
+    assert [one.answer for one in answer.findings if one.effect == "axis_coupling"] == ["not_seen"]
+
+
+def test_one_of_several_that_acts_alone_has_its_id_for_its_name_whatever_its_column_is_called() -> None:
+    runs = []
+    for run in (joint(seed, {3: (0.1, 0.0)}) for seed in (1, 2, 3)):
+        speeds = {f"dq{k}": np.gradient(run[f"q{k}"], run.t) for k in (1, 2)}  # on speeds alone no weight hangs
+        own = {name: run[name] for name in ("t", "tau", "q")}
+        runs.append(Recording.of({**own, **speeds, "joint 3 position": run["q3"]}, run.name))
+    answer = diagnosed(runs, JOINT).diagnosis
+    (row,) = (one for one in answer.findings if one.answer == "found")
+    assert (row.name, row.title, row.source) == ("axis_coupling", "Axis coupling", "joint 3 position")
+    assert not any("axis_coupling:" in rule.name for one in answer.ledger for rule in one.rules)
+    assert {one.effect for one in answer.ledger if one.effect.startswith("axis")} == {"axis_coupling"}
+    assert [one.effect for one in answer.scores.effects] == ["axis_coupling"] if answer.scores else False
+
+
+def test_of_two_that_move_in_proportion_one_is_named_and_the_other_said() -> None:
+    answer = of_joint({2: (0.2, 0.0)}, spare=0.0).diagnosis
+    (row,) = (one for one in answer.findings if one.answer == "found")
+    assert row.parameters == {"inertia": pytest.approx(0.2, rel=0.02)}
+    assert row.statement.endswith("of `q1`. It may as well be `q2`: `q1` moves in proportion to that.")
+
+
+def test_two_that_move_nearly_alike_are_a_set_where_no_evidence_separates_them() -> None:
+    answer = of_joint({1: (0.003, 0.0)}, spare=0.05, noise=0.2).diagnosis
+    assert [{*group} for group in answer.ambiguous_with] == [{"axis_coupling:q1", "axis_coupling:q2"}]
+
+
+def test_a_weight_behind_three_parallel_axes_has_its_size_and_delivers_a_card_that_reads_both() -> None:
+    outcome = diagnosed([wrist(seed, idle=1) for seed in (1, 2, 3)], WRIST)
+    named = {one.name: one for one in outcome.diagnosis.findings if one.answer == "found"}
+    assert next(iter(named)) == "axis_coupling:q1 + q2"
+    assert not [name for name in named if "q4" in name]
+    one, (_, mass, lever) = named["axis_coupling:q1 + q2"], TIP
+    assert one.parameters["weight"] == pytest.approx(mass * 9.81 * lever, rel=0.03)
+    assert one.parameters["phase"] == pytest.approx(0.0, abs=0.03)
+    assert (one.parameters["follows"], one.parameters["follows_second"]) == (1.0, 1.0)
+    assert one.statement.startswith("Two neighbouring axes act on this one: a weight of 1.1")
+    assert one.statement.endswith("that goes with the angle this axis + `q1` + `q2`.")
+    held = outcome.diagnosis.heldout
+    assert held.after_rms < 0.2 * held.before_rms
+
+    again, run = parse_card(card_text(outcome.card, ""), "card.toml").plant(), wrist(1)
+    assert {one.name for one in again.effects} == {*named}
+    check_neighbours(again, [run])
+    assert np.ptp(as_inputs(run, again, 15.0)["second_neighbour_position"] - run["q2"]) < 0.05 * np.ptp(run["q2"])
+    assert isinstance(effect_of(one), ChainCoupling)
+    assert effect_of(one).name == one.name
+
+
+def test_a_weight_on_axes_that_point_elsewhere_is_one_of_eight_products() -> None:
+    answer = diagnosed([forearm(seed) for seed in (1, 2, 3)], WRIST).diagnosis
+    first = next(one for one in answer.findings if one.answer == "found")
+    assert (first.name, {*first.parameters}) == ("axis_coupling:q1 + q2", {*PRODUCTS})
+    assert answer.heldout.after_rms < 0.25 * answer.heldout.before_rms
+
+
+def test_eight_products_hold_the_torque_of_a_weight_that_three_turns_about_any_axes_move() -> None:
+    """But for what hangs on fewer of them: each of axes x, y, x is at right angles to the one before."""
+    dice = np.random.default_rng(1)
+    q, first, second = dice.uniform(-2, 2, (3, 200))
+    turns = [Rotation.from_euler(axis, angle[:, None]) for axis, angle in zip("xyx", (first, second, q), strict=True)]
+    along = (turns[0] * turns[1]).apply([1.0, 0.0, 0.0])
+    arm = (turns[0] * turns[1] * turns[2]).apply([0.0, 1.0, 0.0])
+    torque = -np.sum(along * np.cross(arm, [0.0, 0.0, -1.0]), axis=1)
+
+    space = SpaceCoupling(ccc=1.0)
+    hung = [
+        float(space.load(Motion(0.0, a, 0.0, a, {"neighbour_position": b, "second_neighbour_position": c})))
+        for a, b, c in zip(q, first, second, strict=True)
+    ]
+    np.testing.assert_allclose(torque - hung, -np.sin(q) * np.sin(first), atol=1e-12)

@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -25,24 +26,24 @@ from cosim_studies.proof.generator import write_case
 from pyfmi_models.card import parse_card, read_card
 
 
-class TestEvidence:
-    def test_blocks_hold_every_kept_row_once_and_know_their_recording(self) -> None:
-        t, q, _v, a = wander(60.0)
-        prepared = prepare([recorded(a, t, q), recorded(a, t, q, "two")], 30.0)
-        blocks = Blocks.of(prepared)
-        rows = np.concatenate(blocks.rows)
-        np.testing.assert_array_equal(np.sort(rows), np.arange(len(prepared.recording_of)))
-        assert all(set(prepared.recording_of[r]) == {o} for r, o in zip(blocks.rows, blocks.recording, strict=True))
+def test_blocks_hold_every_kept_row_once_and_know_their_recording() -> None:
+    t, q, _v, a = wander(60.0)
+    prepared = prepare([recorded(a, t, q), recorded(a, t, q, "two")], 30.0)
+    blocks = Blocks.of(prepared)
+    rows = np.concatenate(blocks.rows)
+    np.testing.assert_array_equal(np.sort(rows), np.arange(len(prepared.recording_of)))
+    assert all(set(prepared.recording_of[r]) == {o} for r, o in zip(blocks.rows, blocks.recording, strict=True))
 
-    def test_several_recordings_may_be_held_out(self) -> None:
-        t, q, v, a = wander()
-        pair = [recorded(5 * a + 2 * np.sign(v) + off, t, q, name) for off, name in ((0.3, "one"), (-0.3, "two"))]
-        models = Structures(axis(), axis(), axis())
-        judged = judge(pair, models, Band(30.0))
-        each = [judge([one], models, Band(30.0)).before_rms for one in pair]
-        assert judged.name == "one, two"
-        assert judged.before_rms == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=1e-6)
-        assert [trace.heldout for trace in traces(pair[:1], pair, models)] == [False, True, True]
+
+def test_several_recordings_may_be_held_out() -> None:
+    t, q, v, a = wander()
+    pair = [recorded(5 * a + 2 * np.sign(v) + off, t, q, name) for off, name in ((0.3, "one"), (-0.3, "two"))]
+    models = Structures(axis(), axis(), axis())
+    judged = judge(pair, models, Band(30.0))
+    each = [judge([one], models, Band(30.0)).before_rms for one in pair]
+    assert judged.name == "one, two"
+    assert judged.before_rms == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=1e-6)
+    assert [trace.heldout for trace in traces(pair[:1], pair, models)] == [False, True, True]
 
 
 def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
@@ -64,84 +65,79 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-class TestCommand:
-    def arguments(self, folder: Path, out: Path, *more: str) -> list[str]:
-        train = [str(folder / "train_1.parquet"), str(folder / "train_2.parquet")]
-        held = ["--heldout", str(folder / "heldout.parquet")]
-        return ["diagnose", *train, *held, "--card", str(folder / "card.toml"), "--out", str(out), *more]
+def asked(folder: Path, out: Path, *more: str, held: str = "heldout") -> int:
+    """Diagnose what lies in a folder."""
+    one, two, other = (folder / f"{name}.parquet" for name in ("train_1", "train_2", held))
+    return call("diagnose", one, two, "--heldout", other, "--card", folder / "card.toml", "--out", out, *more)
 
-    def test_files_json_and_improved_card(
-        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        out = tmp_path / "out"
-        assert call(*self.arguments(folder, out, "--json")) == 0
-        printed = json.loads(capsys.readouterr().out)
-        assert printed == json.loads((out / "diagnosis.json").read_text())
-        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
-        jsonschema.Draft202012Validator(schema).validate(printed)
-        assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
-        assert printed["heldout"]["after_rms"] < 0.15 * printed["heldout"]["before_rms"]
-        (ripple,) = [one["parameters"] for one in printed["effects"] if one["effect"] == "cogging"]
-        assert (
-            ripple["cycles_per_rev"] == 20
-        )  # a refit that ends before it has settled leaves 20.8, and .18 of the error
-        first = printed["effects"][0]
-        assert first["answer"] == "found"
-        assert first["standard_errors"]
-        assert first["where"]["axis"]
-        improved = read_card(out / "card.toml")
-        assert {effect.id for effect in improved.effects} == {"cogging", "friction_asymmetry"}
-        assert improved.origin["recordings"][0]["sha256"]
-        rows = pq.read_table(out / "missing_torque.parquet")
-        assert rows.num_rows == sum(
-            pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet")
-        )
-        page = (out / "report.html").read_text()
-        assert "<html" in page
-        assert "not passive" in printed["data_quality"][0]
-        assert "Notes on the card, the recordings and the search" in page
-        assert "it is not passive" in page
-        versions = {
-            path.stem[-5:] == "_fmi2": read_model_description(str(path)).fmiVersion for path in out.glob("*.fmu")
-        }
-        assert versions == {False: "3.0", True: "2.0"}
-        assert call(*self.arguments(folder, out)) == 2
-        assert "exists already" in capsys.readouterr().err
 
-    def test_quick_gives_the_same_answer_and_the_card_alone(
-        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        """Where a whole diagnosis lay, whose files would tell of another answer; one beside them is the user's."""
-        (out := tmp_path / "quick").mkdir()
-        (out / "diagnosis.json").write_text(json.dumps({"improved": {"fmu": "axis_improved.fmu"}}))
-        for name in ("report.html", "missing_torque.parquet", "axis_improved.fmu", "mine.txt"):
-            (out / name).write_text("before")
-        assert call(*self.arguments(folder, out, "--quick")) == 2
-        assert "exists already" in capsys.readouterr().err
-        more = ("--propose", str(tmp_path / "proposed"), "--force")
-        assert call(*self.arguments(folder, out, "--quick", *more)) == 0
-        printed, said = capsys.readouterr()
-        assert "Nothing to propose: nothing is left outside the catalogue." in said
-        assert not (tmp_path / "proposed").exists()
-        assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml", "mine.txt"}
-        assert "Wrote diagnosis.json card.toml" in printed
-        assert "report.html" not in printed
-        told = json.loads((out / "diagnosis.json").read_text())
-        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
-        jsonschema.Draft202012Validator(schema).validate(told)
-        assert sorted(told["verdict"]) == ["cogging", "friction_asymmetry"]
-        assert "--quick" in told["provenance"]["command"]
-        assert told["provenance"]["card"]["sha256"] == hashlib.sha256((folder / "card.toml").read_bytes()).hexdigest()
-        assert not {"fmu", "scenario"} & (set(told["improved"]) | set(told["next_experiment"]))
-        assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}
+def valid(told: Any) -> Any:
+    """A diagnosis as it was written; the schema describes it."""
+    schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(told)
+    assert sorted(told["verdict"]) == ["cogging", "friction_asymmetry"]
+    return told
 
-    def test_the_held_out_recording_must_not_be_fitted(
-        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        given = self.arguments(folder, tmp_path / "out")
-        given[2] = str(folder / "heldout.parquet")
-        assert call(*given) == 2
-        assert "held out" in capsys.readouterr().err
+
+def test_a_diagnosis_writes_json_page_torques_fmus_and_an_improved_card(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert asked(folder, out, "--json") == 0
+    printed = valid(json.loads(capsys.readouterr().out))
+    assert printed == json.loads((out / "diagnosis.json").read_text())
+    assert printed["heldout"]["after_rms"] < 0.15 * printed["heldout"]["before_rms"]
+    (ripple,) = [one["parameters"] for one in printed["effects"] if one["effect"] == "cogging"]
+    assert ripple["cycles_per_rev"] == 20, "a refit that ends before it has settled leaves 20.8, and .18 of the error"
+    first = printed["effects"][0]
+    assert first["answer"] == "found"
+    assert first["standard_errors"]
+    assert first["where"]["axis"]
+    improved = read_card(out / "card.toml")
+    assert {effect.id for effect in improved.effects} == {"cogging", "friction_asymmetry"}
+    assert improved.origin["recordings"][0]["sha256"]
+    rows = [pq.read_table(folder / f"{name}.parquet").num_rows for name in ("train_1", "train_2", "heldout")]
+    assert pq.read_table(out / "missing_torque.parquet").num_rows == sum(rows)
+    page = (out / "report.html").read_text()
+    assert "<html" in page
+    assert "not passive" in printed["data_quality"][0]
+    assert "Notes on the card, the recordings and the search" in page
+    assert "it is not passive" in page
+    versions = {path.stem[-5:] == "_fmi2": read_model_description(str(path)).fmiVersion for path in out.glob("*.fmu")}
+    assert versions == {False: "3.0", True: "2.0"}
+    assert asked(folder, out) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_quick_gives_the_same_answer_and_the_card_alone(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where a whole diagnosis lay, whose files would tell of another answer; one beside them is the user's."""
+    (out := tmp_path / "quick").mkdir()
+    (out / "diagnosis.json").write_text(json.dumps({"improved": {"fmu": "axis_improved.fmu"}}))
+    for name in ("report.html", "missing_torque.parquet", "axis_improved.fmu", "mine.txt"):
+        (out / name).write_text("before")
+    assert asked(folder, out, "--quick") == 2
+    assert "exists already" in capsys.readouterr().err
+    assert asked(folder, out, "--quick", "--propose", str(tmp_path / "proposed"), "--force") == 0
+    printed, said = capsys.readouterr()
+    assert "Nothing to propose: nothing is left outside the catalogue." in said
+    assert not (tmp_path / "proposed").exists()
+    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml", "mine.txt"}
+    assert "Wrote diagnosis.json card.toml" in printed
+    assert "report.html" not in printed
+    told = valid(json.loads((out / "diagnosis.json").read_text()))
+    assert "--quick" in told["provenance"]["command"]
+    assert told["provenance"]["card"]["sha256"] == hashlib.sha256((folder / "card.toml").read_bytes()).hexdigest()
+    assert not {"fmu", "scenario"} & (set(told["improved"]) | set(told["next_experiment"]))
+    assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}
+
+
+def test_the_held_out_recording_must_not_be_fitted(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert asked(folder, tmp_path / "out", held="train_1") == 2
+    assert "held out" in capsys.readouterr().err
 
 
 def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:

@@ -1,47 +1,38 @@
 """Constants of the policy where they act, in numbers that do not move with them: half or twice the value fails here."""
 
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from wandering import swing
+from problems import compared, problem_of
+from wandering import axis, recorded, swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.candidates import columns_of
 from cosim.diagnosis.evidence.bands import Bands
-from cosim.diagnosis.evidence.comparison import NONE, Comparison
+from cosim.diagnosis.evidence.comparison import NONE
 from cosim.diagnosis.evidence.discrepancy import discrepancy
 from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import is_full, with_harmonics
 from cosim.estimation.prepare import Prepared, prepare
-from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
 
-MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+MOUNT = axis()
 RIPPLE = Cogging(amplitude=0.3, cycles_per_rev=20.0)
 
 
-def recorded(seconds: float, second_wave: float = 0.0, noise: float = 0.002, seed: int = 1) -> Recording:
+def rippled(seconds: float, second_wave: float = 0.0, noise: float = 0.002, seed: int = 1) -> Recording:
     """An axis with a ripple that has a second wave of some size."""
     t = np.arange(int(500 * seconds)) / 500
     q, v, a = swing(t, [(0.5, 0.7, 1.0 + seed), (0.1, 2.3, 2.0), (0.02, 5.7, 0.5)], per=1)
     extra = 0.3 * np.cos(20 * q) + second_wave * np.cos(40 * q)
     tau = 5 * a + 2 * np.sign(v) + v + extra + noise * np.random.default_rng(seed).standard_normal(len(t))
-    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": tau})
-
-
-def problem_of(*recordings: Recording) -> Problem:
-    prepared = prepare(recordings, 20.0)
-    weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
-    return Problem(MOUNT, prepared, weight, 0.002)
+    return recorded(tau, t, q, f"run_{seed}")
 
 
 def bands(prepared: Prepared) -> Bands:
@@ -50,7 +41,7 @@ def bands(prepared: Prepared) -> Bands:
 
 
 def test_of_the_rows_of_a_band_four_hundred_count_at_most_and_of_as_many_half() -> None:
-    short, long = (bands(prepare([recorded(seconds)], 20.0)) for seconds in (10.0, 200.0))
+    short, long = (bands(prepare([rippled(seconds)], 20.0)) for seconds in (10.0, 200.0))
     for one in (short, long):
         assert one.effective == pytest.approx(one.count * 400 / (400 + one.count), rel=1e-9)
     assert short.effective[0] > 0.9 * short.count[0], "few rows are all new"
@@ -58,7 +49,7 @@ def test_of_the_rows_of_a_band_four_hundred_count_at_most_and_of_as_many_half() 
 
 
 def test_no_model_of_a_torque_is_better_than_a_thousandth_of_it() -> None:
-    prepared = prepare([recorded(20.0, noise=0.0)], 20.0)
+    prepared = prepare([rippled(20.0, noise=0.0)], 20.0)
     own = bands(prepared)
     torque = own.grams(own.transform(prepared.stacked("tau")[:, None]))[:, 0, 0] / own.count
     assert np.sqrt(own.least_noise(prepared, 0.0, POLICY) / torque) == pytest.approx(1e-3, rel=0.01)
@@ -66,7 +57,7 @@ def test_no_model_of_a_torque_is_better_than_a_thousandth_of_it() -> None:
 
 def test_a_level_wanders_as_a_process_does_that_forgets_itself_in_ten_seconds() -> None:
     """Cosine k of T seconds turns by w = pi k / T a second; of such a process it has a share 1 / (1 + (10 w)^2)."""
-    prepared = prepare([recorded(10 * np.pi)], 20.0)
+    prepared = prepare([rippled(10 * np.pi)], 20.0)
     found = discrepancy(MOUNT, prepared, POLICY)
     (group,) = (one for one in found.groups if one.name == "wander")
     constant, *waves = found.columns[0, list(group.columns)]
@@ -76,37 +67,30 @@ def test_a_level_wanders_as_a_process_does_that_forgets_itself_in_ten_seconds() 
 
 @pytest.mark.parametrize(("second_wave", "told"), [(0.2, True), (0.0, False)])
 def test_a_size_is_told_that_stands_out_of_its_error(second_wave: float, told: bool) -> None:
-    problem = problem_of(recorded(20.0, second_wave, noise=0.05), recorded(20.0, second_wave, noise=0.05, seed=2))
+    runs = (rippled(20.0, second_wave, noise=0.05, seed=seed) for seed in (1, 2))
+    problem = problem_of(MOUNT, *runs, sample=0.002)
     waves = RIPPLE, replace(RIPPLE, amplitude=0.01, cycles_per_rev=40.0)
     found = problem.fit(replace(MOUNT, effects=waves), 30)
     assert tells(problem, found, found.mount.effects[0])
     assert tells(problem, found, found.mount.effects[1]) is told
 
 
-@cache
-def beside_ripple(second_wave: float) -> tuple[Comparison, Any, float]:
-    """The ripple fitted, and the evidence of its second wave."""
-    problem = problem_of(recorded(20.0, second_wave))
-    base = problem.fit(MOUNT, 15)
-    comparison, found = Comparison.of(problem, base, POLICY), problem.fit(replace(MOUNT, effects=(RIPPLE,)), 15)
-    second = [hypothesis_of(RIPPLE).multiple(RIPPLE, 2)]
-    columns = columns_of(found.mount, second, problem.prepared, found.values)  # type: ignore[arg-type]
-    return comparison, found, comparison.score(found, second, columns)[0].evidence  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(("second_wave", "between", "waves"), [(1.05e-3, (5.0, 10.0), 1), (1.18e-3, (10.0, 20.0), 2)])
 def test_a_further_wave_of_a_ripple_is_taken_from_ten_nats_on(
     second_wave: float, between: tuple[float, float], waves: int
 ) -> None:
-    comparison, found, evidence = beside_ripple(second_wave)
-    assert between[0] < evidence < between[1]
+    comparison, _ = compared(problem_of(MOUNT, rippled(20.0, second_wave), sample=0.002), 15)
+    problem = comparison.problem
+    found = problem.fit(replace(MOUNT, effects=(RIPPLE,)), 15)
+    second: Any = [hypothesis_of(RIPPLE).multiple(RIPPLE, 2)]
+    columns = columns_of(found.mount, second, problem.prepared, found.values)
+    assert between[0] < comparison.score(found, second, columns)[0].evidence < between[1]
     assert len(with_harmonics(comparison, found, found.mount.effects[-1]).mount.effects) == waves
 
 
 def test_each_phase_that_a_recording_has_of_its_own_costs_half_the_logarithm_of_ten() -> None:
-    problem = problem_of(*(recorded(10.0, seed=seed) for seed in (1, 2, 3)))
-    base = problem.fit(MOUNT, 15)
-    comparison = Comparison.of(problem, base, POLICY)
+    problem = problem_of(MOUNT, *(rippled(10.0, seed=seed) for seed in (1, 2, 3)), sample=0.002)
+    comparison, base = compared(problem, 15)
     found = problem.fit(replace(MOUNT, effects=(PeriodicDisturbance(frequency_hz=3.0, amplitude=0.1),)), 10)
     assert found.phases == 3
     paid = comparison._marginal(found, NONE).log_likelihood - comparison.evidence(found)

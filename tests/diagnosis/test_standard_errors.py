@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
@@ -37,11 +38,9 @@ TRUE = {
 
 def recorded(rng: np.random.Generator, name: str, seconds: float = SECONDS) -> Recording:
     """A motion of two tones and the torque of the true machine, with noise that forgets itself in 0.3 s."""
-    t, (q, v, a) = np.arange(int(seconds * HERTZ)) / HERTZ, np.zeros((3, int(seconds * HERTZ)))
-    for size, slow, fast in ((0.8, 0.15, 0.25), (0.15, 0.4, 0.6)):
-        w, phase = 2 * np.pi * rng.uniform(slow, fast), rng.uniform(0, 2 * np.pi)
-        tone = size * np.exp(1j * (w * t + phase))
-        q, v, a = q + tone.imag, v + w * tone.real, a - w**2 * tone.imag
+    t = np.arange(int(seconds * HERTZ)) / HERTZ
+    tones = ((0.8, 0.15, 0.25), (0.15, 0.4, 0.6))
+    q, v, a = swing(t, [(size, rng.uniform(low, high), rng.uniform(0, 2 * np.pi)) for size, low, high in tones])
     keep = np.exp(-1 / HERTZ / 0.3)
     noise = 0.05 * lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(t.size))
     friction = 1.1 * np.sign(v) + 2.8 * v + 0.4 * v * np.abs(v)

@@ -74,9 +74,9 @@ def wanders(now: dict[str, Array]) -> Array:
     return (-1.0 if now["run"][0] == 3 else 1.0) * np.cos(20 * now["q"])
 
 
-def recording(extra: Extra, seed: int) -> Recording:
+def recording(extra: Extra, seed: int, noise: float = NOISE) -> Recording:
     now, rng = night(seed), np.random.default_rng(100 + seed)
-    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now) + NOISE * rng.standard_normal(6000)
+    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now) + noise * rng.standard_normal(6000)
     return Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau})
 
 

@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
+from problems import compared
+from wandering import recorded, swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Finding
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects.candidates import at_own_level
-from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
 from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.diagnosis.search.sizes import Numbers
 from cosim.diagnosis.search.stages import refitted
-from cosim.estimation.fit import Fit
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects import Motion
 from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction, LoadScaledFriction
@@ -29,32 +29,24 @@ def card(mgl: float) -> Card:
     return parse_card(BASE + (f"[unbalance]\nmgl = {mgl}\nphase = {PHASE}\n" if mgl else ""), "card.toml")
 
 
-def recorded(mgl: float, rise: float = 0.0, seed: int = 1) -> Recording:
-    """An axis with that load, 1.2 rad either way, and friction that rises by so much per unit of it."""
+def loaded(mgl: float, seed: int) -> Recording:
+    """An axis with that load, 1.2 rad either way."""
     t = np.arange(2000) / 100
-    q = 1.2 * np.sin(0.7 * t + seed) + 0.1 * np.sin(2.3 * t + 1)
-    v = 0.84 * np.cos(0.7 * t + seed) + 0.23 * np.cos(2.3 * t + 1)
-    a = -0.588 * np.sin(0.7 * t + seed) - 0.529 * np.sin(2.3 * t + 1)
-    load, noise = mgl * np.sin(q + PHASE), 0.05 * np.random.default_rng(seed).standard_normal(len(t))
-    tau = 2 * a + (1 + rise * np.abs(load)) * np.sign(v) + 3 * v + load + noise
-    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": tau})
-
-
-def compared(mgl: float, rise: float = 0.0) -> tuple[Comparison, Fit]:
-    problem = _problem([recorded(mgl, rise, seed) for seed in (1, 2)], card(mgl))
-    base = problem.fit(problem.mount, 25)
-    return Comparison.of(problem, base, POLICY), base
+    q, v, a = swing(t, [(1.2, 0.7, seed), (0.1, 2.3, 1.0)], per=1)
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(t))
+    return recorded(2 * a + np.sign(v) + 3 * v + mgl * np.sin(q + PHASE) + noise, t, q, f"run_{seed}")
 
 
 def answered(mgl: float) -> Finding:
     """What is said of it where there is none."""
-    findings = not_found(*compared(mgl), [], 0.0)
+    problem = _problem([loaded(mgl, seed) for seed in (1, 2)], card(mgl))
+    findings = not_found(*compared(problem), [], 0.0)
     return next(one for one in findings if one.effect == "load_dependent_friction")
 
 
-def test_a_load_that_the_card_states_gives_a_bound_and_half_of_it_one_twice_as_large() -> None:
-    whole, half = (answered(mgl) for mgl in (4.0, 2.0))
-    for one in (whole, half):
+def test_a_load_of_the_card_gives_a_bound_half_of_it_one_twice_as_large_and_none_the_load_of_a_gear() -> None:
+    whole, half, none = (answered(mgl) for mgl in (4.0, 2.0, 0.0))
+    for one in (whole, half, none):
         assert one.answer == "not_seen"
         assert one.bound is not None
         assert one.bound.unit == "% of the load"
@@ -64,31 +56,21 @@ def test_a_load_that_the_card_states_gives_a_bound_and_half_of_it_one_twice_as_l
     assert half.visible_from == pytest.approx(2 * whole.visible_from, rel=0.05)
 
 
-def test_without_a_load_in_the_card_what_accelerates_the_axis_loads_a_gear() -> None:
-    one = answered(0.0)
-    assert one.answer == "not_seen"
-    assert one.bound is not None
-    assert one.bound.unit == "% of the load"
-
-
 def geared(rise: float, inertia: float, others: float, seed: int) -> Recording:
     """Quick moves of an axis without a weight, friction of which rises by so much per unit through its gear."""
     t = np.arange(4000) / 200
-    v = 1.5 * np.sin(1.9 * t + seed) + 0.8 * np.sin(5.3 * t + 1)
-    q = -1.5 / 1.9 * np.cos(1.9 * t + seed) - 0.8 / 5.3 * np.cos(5.3 * t + 1)
-    a = 1.5 * 1.9 * np.cos(1.9 * t + seed) + 0.8 * 5.3 * np.cos(5.3 * t + 1)
+    q, v, a = swing(t, [(1.5 / 1.9, 1.9, seed - np.pi / 2), (0.8 / 5.3, 5.3, 1 - np.pi / 2)], per=1)
     friction = np.sign(v) + 3 * v
     for _ in range(60):  # the friction is part of what goes through, which is part of friction
         friction = (1 + rise * np.abs(inertia * 2 * a + others * friction)) * np.sign(v) + 3 * v
     noise = 0.05 * np.random.default_rng(seed).standard_normal(len(t))
-    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": 2 * a + friction + noise})
+    return recorded(2 * a + friction + noise, t, q, f"run_{seed}")
 
 
 @pytest.mark.parametrize("others", [0.0, 1.0])
 def test_a_gear_is_told_from_a_drive_that_gives_less_and_by_the_side_that_feels_the_torque(others: float) -> None:
     problem = _problem([geared(0.15, 1.0, others, seed) for seed in (1, 2)], card(0.0))
-    base = problem.fit(problem.mount, 25)
-    comparison = Comparison.of(problem, base, POLICY)
+    comparison, base = compared(problem)
     sides = [
         GearLoadFriction(coulomb_per_Nm=0.01, at_level=1.0, inertia_share=1.0, friction_share=one)
         for one in (others, 1 - others)

@@ -4,12 +4,14 @@ Between a late torque and a late reading the reading's own lag behind the set po
 """
 
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
+from problems import compared
+from wandering import axis, swing
+from wandering import recorded as read
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
@@ -17,9 +19,8 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
-from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
-from cosim.diagnosis.search.stages import CandidateFit, admission, margin, refitted
+from cosim.diagnosis.search.stages import admission, margin, refitted
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.card import parse_card
@@ -27,10 +28,10 @@ from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, 
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.friction import Coulomb, FrictionLaw, LuGre
-from pyfmi_models.mount import Axis, Mount
+from pyfmi_models.friction import LuGre
+from pyfmi_models.mount import Mount
 
-BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=0.5, sigma2=1.0))
+BASE = axis(Fc=0.5)
 Drive = Delay | ActuatorLag
 
 
@@ -57,11 +58,14 @@ def test_the_right_one_of_delay_and_lag_is_told_in_noise_that_the_controller_ans
         assert misfits[other] - misfits[drive.id] > DECISIVE
 
 
+def blind(prepared: Prepared) -> Prepared:
+    """The same without a set point."""
+    return replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
+
+
 def test_without_a_set_point_nothing_is_said() -> None:
     drive = Delay(delay_ms=5.0)
-    prepared = answered(drive, 0.0)
-    blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
-    assert misfits_of(blind, replace(BASE, effects=(drive,)), drive) == {}
+    assert misfits_of(blind(answered(drive, 0.0)), replace(BASE, effects=(drive,)), drive) == {}
 
 
 def trailing(seconds: float, noise: float = 2e-6) -> Prepared:
@@ -82,9 +86,8 @@ def test_how_late_a_reading_is_behind_its_set_point_is_measured_within_its_error
 def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_was_not_recorded() -> None:
     prepared = trailing(12e-3)
     assert attributed(prepared, 5e-3, 1e-3) == "either"
-    blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
-    assert attributed(blind, 5e-3, 1e-3) == "either"
-    assert attributed(blind, 0.5e-3, 1e-3) == "drive"
+    assert attributed(blind(prepared), 5e-3, 1e-3) == "either"
+    assert attributed(blind(prepared), 0.5e-3, 1e-3) == "drive"
 
 
 @pytest.mark.parametrize(
@@ -126,74 +129,50 @@ def test_a_lag_is_no_clocks_where_it_lies_in_the_drive_and_no_drives_where_it_li
 # A contact that bends, a delay and a play look alike about turns: which stays a rival, and which tells a size.
 
 CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 1.0\n', "card.toml")
-CONTACT, LATE = Presliding(sigma0=1000.0), Delay(delay_ms=5.0)
 STARTS = (Presliding(sigma0=100.0), Delay(delay_ms=3.0), Backlash(gap_rad=1e-3, load_share=0.3, load_friction=0.1))
-
-
-class Tried(NamedTuple):
-    """All three beside one base."""
-
-    comparison: Comparison
-    fits: dict[str, CandidateFit]
 
 
 def recorded(effect: Effect, noise: float, seed: int, ripple: float) -> Recording:
     """A machine with an effect, 0.3 rad to and fro, and a faster motion over it."""
     t, rng = np.arange(3000) / 200, np.random.default_rng(seed)
-    q = 0.3 * np.sin(1.5 * (t + seed)) + ripple * np.sin(5 * (t + seed))
-    (piece,) = prepare([Recording("still", {"t": t, "tau": t, "q": q})], 90.0).pieces
+    q, _, _ = swing(t, [(0.3, 1.5, 1.5 * seed), (ripple, 5.0, 5.0 * seed)], per=1)
+    (piece,) = prepare([read(t, t, q)], 90.0).pieces
     tau = Inverse(replace(CARD.plant(), effects=(effect,)), ()).torque(piece, np.zeros(0))[0]
-    return Recording(f"run_{seed}", {"t": piece.t, "q": piece.q, "tau": tau + noise * rng.standard_normal(len(tau))})
+    return read(tau + noise * rng.standard_normal(len(tau)), piece.t, piece.q, f"run_{seed}")
 
 
-@cache
-def tried(effect: Effect, noise: float, ripple: float) -> Tried:
-    problem = _problem([recorded(effect, noise, seed, ripple) for seed in (1, 2)], CARD)
-    base = problem.fit(problem.mount, 40)
-    comparison = Comparison.of(problem, base, POLICY)
-    return Tried(comparison, {one.id: refitted(comparison, base, one, 1) for one in STARTS})
-
-
-BENT, DELAYED = (CONTACT, 0.1, 0.0), (LATE, 0.02, 0.03)
-
-
-@pytest.mark.parametrize(("case", "name"), [(BENT, "presliding"), (DELAYED, "delay")])
+@pytest.mark.parametrize(
+    ("effect", "noise", "ripple"),
+    [(Presliding(sigma0=1000.0), 0.1, 0.0), (Delay(delay_ms=5.0), 0.02, 0.03)],
+    ids=["a contact that bends", "a delay"],
+)
 def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
-    case: tuple[Effect, float, float], name: str
+    effect: Effect, noise: float, ripple: float
 ) -> None:
-    this = tried(*case)
-    own = this.fits[name]
+    comparison, base = compared(_problem([recorded(effect, noise, seed, ripple) for seed in (1, 2)], CARD), 40)
+    fits = {one.id: refitted(comparison, base, one, 1) for one in STARTS}
+    own = fits[effect.id]
     assert own.evidence > POLICY.clear
-    near = {
-        rival
-        for rival, one in this.fits.items()
-        if all_pass(admission(this.comparison, one)) and margin(this.comparison, own, one) < POLICY.fair
-    }
-    assert near == {name}
+    admitted = {name: one for name, one in fits.items() if all_pass(admission(comparison, one))}
+    assert {name for name, one in admitted.items() if margin(comparison, own, one) < POLICY.fair} == {effect.id}
 
 
-COULOMB = Coulomb(Fc=2.0, sigma2=1.0)
 LUGRE = LuGre(sigma0=1e5, sigma1=300.0, sigma2=1.0, Fc=2.0, Fs=2.5, Vs=0.01)
-OFFSET, ASYMMETRY = TorqueOffset(torque=0.3), FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=0.0)
 
 
-@pytest.fixture(scope="module")
-def prepared() -> Prepared:
+def offered(prepared: Prepared, mount: Mount, *effects: Effect) -> set[str]:
+    rows = np.ones(len(prepared.recording_of))
+    return {one.effect for one in candidates(replace(mount, effects=effects), prepared, rows, rows)}
+
+
+@pytest.mark.parametrize(("mount", "both"), [(axis(), False), (replace(axis(), friction=LUGRE), True)])
+def test_an_offset_and_an_asymmetry_are_offered_beside_each_other_only_where_rest_tells_them_apart(
+    mount: Mount, both: bool
+) -> None:
     t = np.arange(4_000) / 200
     v = 0.2 * np.cos(0.9 * t)
-    return prepare([Recording("run", {"t": t, "tau": 2 * np.sign(v) + v, "q": np.cumsum(v) / 200})], 10.0)
-
-
-def offered(prepared: Prepared, law: FrictionLaw, *effects: Effect) -> set[str]:
-    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=law, effects=effects)
-    rows = len(prepared.recording_of)
-    return {one.effect for one in candidates(mount, prepared, np.ones(rows), np.ones(rows))}
-
-
-@pytest.mark.parametrize(("law", "both"), [(COULOMB, False), (LUGRE, True)])
-def test_one_is_offered_beside_the_other_only_where_rest_tells_them_apart(
-    prepared: Prepared, law: FrictionLaw, both: bool
-) -> None:
-    assert {"torque_offset", "friction_asymmetry"} <= offered(prepared, law)
-    assert ("friction_asymmetry" in offered(prepared, law, OFFSET)) is both
-    assert ("torque_offset" in offered(prepared, law, ASYMMETRY)) is both
+    prepared = prepare([read(2 * np.sign(v) + v, t, np.cumsum(v) / 200)], 10.0)
+    sides = FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=0.0)
+    assert {"torque_offset", "friction_asymmetry"} <= offered(prepared, mount)
+    assert ("friction_asymmetry" in offered(prepared, mount, TorqueOffset(torque=0.3))) is both
+    assert ("torque_offset" in offered(prepared, mount, sides)) is both

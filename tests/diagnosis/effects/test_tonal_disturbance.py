@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_loop import recorded
-from wandering import swing
+from problems import diagnosed, problem_of
+from wandering import axis, swing
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.diagnose import Outcome, diagnose
 from cosim.diagnosis.effects.candidates import span_of
 from cosim.diagnosis.effects.periodogram import tones
 from cosim.estimation.fit import fit
@@ -17,46 +17,33 @@ from cosim.estimation.prepare import prepare
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
 
 HERTZ, SECOND, AMPLITUDE = 4.3, 9.1, 0.4
-BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+BASE = axis()
+CARD = '[mount]\ninertia = 5.0\n[friction]\nmodel = "coulomb"\nFc = 2.0\nsigma2 = 1.0\n'
 
 
-def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 12.0) -> Recording:
-    """A wandering motion of the base, disturbed by two tones, with a little noise."""
-    t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
+def disturbed(number: int) -> Recording:
+    """12 s of a wandering motion of the base, disturbed by two tones of other phases in each, with a little noise."""
+    t, rng = np.arange(3000) / 250, np.random.default_rng(number)
     q, v, a = swing(t, list(zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)))
-    disturbed = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
+    waves = np.sin(2 * np.pi * HERTZ * t + 0.5 + number), 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * (0.5 + number))
     noise = 0.05 * rng.standard_normal(len(t))
-    return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + disturbed + noise, "q": q})
-
-
-def disturbed(*amplitudes: float) -> list[Recording]:
-    """Recordings with tones of these amplitudes, in each in other phases."""
-    return [run(f"run_{k}", amplitude, 0.5 + k, k) for k, amplitude in enumerate(amplitudes)]
-
-
-def answered(*amplitudes: float) -> Outcome:
-    *train, held = disturbed(*amplitudes)
-    card = replace(read_card("paper_mount"), controller=None)
-    card = replace(card, mount=card.mount.model_copy(update={"inertia": 5.0}), friction=BASE.friction)
-    return diagnose(train, [held], card)
+    tau = 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + AMPLITUDE * sum(waves) + noise
+    return Recording(f"run_{number}", {"t": t, "tau": tau, "q": q})
 
 
 def test_a_fit_finds_one_frequency_and_one_amplitude_over_recordings_of_other_phases() -> None:
-    prepared = prepare(disturbed(AMPLITUDE, AMPLITUDE), 20.0)
+    problem = problem_of(BASE, disturbed(0), disturbed(1))
     start = replace(BASE, effects=(PeriodicDisturbance(frequency_hz=HERTZ + 0.005, amplitude=0.1),))
-    weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
-    found = fit(start, prepared.pieces, weight)
+    found = fit(start, problem.prepared.pieces, problem.weight)
     assert "periodic_disturbance.phase" not in found.free
     tone = found.mount.effects[0]
     assert isinstance(tone, PeriodicDisturbance)
     assert tone.frequency_hz == pytest.approx(HERTZ, abs=1e-3)
     assert tone.amplitude == pytest.approx(AMPLITUDE, rel=0.05)
     inverse = Inverse(found.mount, found.free)
-    phases = [inverse.phases(piece, found.values)["periodic_disturbance.phase"] for piece in prepared.pieces]
+    phases = [inverse.phases(piece, found.values)["periodic_disturbance.phase"] for piece in problem.prepared.pieces]
     assert phases == pytest.approx([0.5, 1.5], abs=0.1)
     assert tone.phase == pytest.approx(phases[0])
 
@@ -72,7 +59,7 @@ def test_behind_a_lag_amplitude_and_phase_are_those_of_the_disturbance_not_of_th
 
 
 def test_a_machine_with_two_tones_is_one_disturbance_and_its_card_holds_both() -> None:
-    outcome = answered(AMPLITUDE, AMPLITUDE, AMPLITUDE)
+    outcome = diagnosed([disturbed(number) for number in range(3)], CARD)
     assert outcome.diagnosis.verdict == ("periodic_disturbance",)
     (found,) = (one for one in outcome.diagnosis.findings if one.answer == "found")
     assert found.statement.endswith("Further tones: 9.1 Hz.")

@@ -4,17 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wandering import axis
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.effects import TRIED, candidates, named
 from cosim.diagnosis.effects.base import HELD, NO_FRICTION, NO_POSITION, UNSEEN
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import CATALOGUE, ActuatorLag, Cogging, FrictionAsymmetry, GravityUnbalance
-from pyfmi_models.friction import Coulomb, Frictionless, LuGre
-from pyfmi_models.mount import Axis, Mount
+from pyfmi_models.friction import Frictionless, LuGre
+from pyfmi_models.mount import Mount
 
 T = np.arange(8000) / 200
-BARE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+BARE = axis()
 
 
 def taken(q: np.ndarray, of: str = "q") -> Prepared:
@@ -24,23 +25,28 @@ def taken(q: np.ndarray, of: str = "q") -> Prepared:
 BOTH_WAYS, ONE_WAY = 0.3 * np.sin(T), 0.3 * T + 0.05 * np.sin(T)
 
 
-def reason(effect: str, mount: Mount = BARE, prepared: Prepared | None = None) -> str:
-    return named(effect).why_not(mount, prepared or taken(BOTH_WAYS))
-
-
 @pytest.mark.parametrize("effect", TRIED)
 def test_what_to_record_is_said_of_every_effect(effect: str) -> None:
     assert all(form.to_record.startswith("record ") for form in CATALOGUE[effect])
 
 
-def test_the_reason_is_the_one_that_holds() -> None:
-    both = replace(BARE, effects=(GravityUnbalance(mgl=1.0, phase=0.0), FrictionAsymmetry(level_asymmetry=0.1)))
-    assert [reason(name, both) for name in ("gravity_unbalance", "friction_asymmetry")] == [HELD, HELD]
-    assert reason("gravity_unbalance", replace(BARE, motion="linear")) == "a linear axis has no unbalance"
-    assert reason("friction_asymmetry", prepared=taken(ONE_WAY)) == "these recordings hold no reversals"
-    assert reason("friction_asymmetry", replace(BARE, friction=Frictionless())) == NO_FRICTION
-    assert reason("cable_wrap", prepared=taken(np.cos(T), "v")) == NO_POSITION
-    assert reason("quadratic_drag", prepared=taken(np.cos(T), "v")) == UNSEEN
+BOTH = (GravityUnbalance(mgl=1.0, phase=0.0), FrictionAsymmetry(level_asymmetry=0.1))
+
+
+@pytest.mark.parametrize(
+    ("effect", "mount", "prepared", "reason"),
+    [
+        ("gravity_unbalance", replace(BARE, effects=BOTH), taken(BOTH_WAYS), HELD),
+        ("friction_asymmetry", replace(BARE, effects=BOTH), taken(BOTH_WAYS), HELD),
+        ("gravity_unbalance", replace(BARE, motion="linear"), taken(BOTH_WAYS), "a linear axis has no unbalance"),
+        ("friction_asymmetry", BARE, taken(ONE_WAY), "these recordings hold no reversals"),
+        ("friction_asymmetry", replace(BARE, friction=Frictionless()), taken(BOTH_WAYS), NO_FRICTION),
+        ("cable_wrap", BARE, taken(np.cos(T), "v"), NO_POSITION),
+        ("quadratic_drag", BARE, taken(np.cos(T), "v"), UNSEEN),
+    ],
+)
+def test_the_reason_is_the_one_that_holds(effect: str, mount: Mount, prepared: Prepared, reason: str) -> None:
+    assert named(effect).why_not(mount, prepared) == reason
 
 
 def test_an_effect_that_the_law_or_the_card_holds_needs_no_recording() -> None:
@@ -58,11 +64,7 @@ def asked(mount: Mount) -> set[str]:
 
 
 def test_an_effect_that_a_mount_has_is_no_candidate_again_but_further_waves_are() -> None:
-    had = (
-        GravityUnbalance(mgl=1.0, phase=0.0),
-        FrictionAsymmetry(level_asymmetry=0.1),
-        Cogging(cycles_per_rev=3, amplitude=0.1, phase=0),
-    )
+    had = (*BOTH, Cogging(cycles_per_rev=3, amplitude=0.1, phase=0))
     names = {effect.id for effect in had}
     assert names <= asked(BARE)
     assert names & asked(replace(BARE, effects=had)) == {"cogging"}

@@ -25,8 +25,8 @@ def left(residual: Array) -> Any:
     return SimpleNamespace(residual=residual)
 
 
-RIGHT, RIGHT_LONG = left(np.zeros(2 * RATE)), left(np.zeros(4 * RATE))
-"""Structures that leave nothing in training."""
+RIGHT = left(np.zeros(4 * RATE))
+"""A structure that leaves nothing in training."""
 
 
 def elsewhere(v: Array, moved: Array | None = None, **other: Array) -> Any:
@@ -37,12 +37,14 @@ def elsewhere(v: Array, moved: Array | None = None, **other: Array) -> Any:
     )
 
 
-def test_a_constant_rest_counts_whole_and_one_that_changes_within_a_quarter_of_a_second_not_at_all() -> None:
-    comparison = comparing(steady(4), 2.0)
-    fast = np.tile([1.0, -1.0], 2 * RATE)
-    assert share_left(comparison, left(np.full(4 * RATE, 0.5))) == pytest.approx(0.25, rel=1e-12)
-    assert share_left(comparison, left(fast)) == pytest.approx(0.0, abs=1e-12)
-    assert share_left(comparison, left(0.5 + fast)) == pytest.approx(0.25, rel=1e-12)
+FAST = np.tile([1.0, -1.0], 2 * RATE)
+
+
+@pytest.mark.parametrize(("rest", "share"), [(0.5 + 0 * FAST, 0.25), (FAST, 0.0), (0.5 + FAST, 0.25)])
+def test_a_constant_rest_counts_whole_and_one_that_changes_within_a_quarter_of_a_second_not_at_all(
+    rest: Array, share: float
+) -> None:
+    assert share_left(comparing(steady(4), 2.0), left(rest)) == pytest.approx(share, rel=1e-12, abs=1e-12)
 
 
 def test_only_rows_in_clear_motion_count_by_their_weight() -> None:
@@ -59,27 +61,20 @@ def test_where_friction_is_small_a_tenth_of_the_torque_stands_for_it(level: floa
     assert share_left(comparing(steady(2), level), left(np.full(2 * RATE, 0.5))) == pytest.approx(expected, rel=1e-12)
 
 
-def test_what_is_left_elsewhere_is_told_by_the_friction_of_training() -> None:
-    there = elsewhere(np.repeat([1.0, 0.0], RATE))
-    rest = np.repeat([1.0, 50.0], RATE)
-    assert share_there(comparing(steady(2), 4.0), RIGHT, rest, there) == pytest.approx(0.25, rel=1e-12)
+@pytest.mark.parametrize(
+    ("open_", "wrong", "expected"), [(2.0, 0.0, 0.0), (0.02, 0.0, 0.125), (0.0, 0.0, 0.25), (0.1, 0.4, 0.2)]
+)
+def test_what_training_leaves_open_is_not_left_elsewhere(open_: float, wrong: float, expected: float) -> None:
+    """A rest of 1 N m of 4; a number whose error there is `open_` N m moves by one error.
 
-
-@pytest.mark.parametrize(("open_", "expected"), [(2.0, 0.0), (0.02, 0.125), (0.0, 0.25)])
-def test_what_training_leaves_open_is_not_left_elsewhere(open_: float, expected: float) -> None:
-    """A rest of 1 N m; a number whose error there is `open_` N m moves by one error, as cells are wrong by .04 N m."""
+    Cells are as uncertain as those of training are wrong, .04 N m at least.
+    """
     there = elsewhere(np.ones(RATE), np.full((RATE, 1), open_))
-    four = np.ones(4)
-    told = 1 - open_**2 * (four @ four) / (open_**2 * (four @ four) + 0.04**2)
-    found = share_there(comparing(steady(2), 4.0), RIGHT, np.ones(RATE), there)
+    moved = 4 * open_**2
+    told = 1 - moved / (moved + max(wrong, 0.04) ** 2)
+    found = share_there(comparing(steady(2), 4.0), left(np.full(2 * RATE, wrong)), np.ones(RATE), there)
     assert found == pytest.approx(0.25 * told, rel=1e-9)
     assert found == pytest.approx(expected, abs=0.01)
-
-
-def test_cells_elsewhere_are_as_uncertain_as_those_of_training_are_wrong() -> None:
-    there = elsewhere(np.ones(RATE), np.full((RATE, 1), 0.1))
-    wrong = left(np.full(2 * RATE, 0.4))
-    assert share_there(comparing(steady(2), 4.0), wrong, np.ones(RATE), there) == pytest.approx(0.25 / 1.25, rel=1e-9)
 
 
 def test_friction_of_training_is_that_of_clear_motion_by_its_weight() -> None:
@@ -91,32 +86,34 @@ def test_friction_of_training_is_that_of_clear_motion_by_its_weight() -> None:
     )
     clear = np.r_[np.full(RATE, 3.0), np.full(RATE - 1, 1.0)]  # the last row before the rest is near a turn
     expected = 1.0 / np.sqrt(clear @ level[: 2 * RATE - 1] ** 2 / clear.sum())
-    assert share_there(comparing(motion, level, weight), RIGHT_LONG, np.ones(RATE), there) == pytest.approx(
+    assert share_there(comparing(motion, level, weight), RIGHT, np.ones(RATE), there) == pytest.approx(
         expected, rel=1e-3
     )
 
 
+SECONDS = np.arange(8 * RATE) / RATE
+TURNING = np.sign(np.sin(2 * np.pi * SECONDS) + 1e-9)
+DRIFT = np.sin(2 * np.pi * SECONDS / 8)
+LATE, EARLY = np.clip(SECONDS - 4, 0, 1), 0.2 * np.clip(2 - SECONDS, 0, 1)
+
+
 @pytest.mark.parametrize("size", [1.0, 1e-6])
-def test_a_torque_or_a_friction_level_over_time_whichever_explains_more(size: float) -> None:
-    seconds = np.arange(8 * RATE) / RATE
-    drift = size * np.sin(2 * np.pi * seconds / 8)
-    turning = np.sign(np.sin(2 * np.pi * seconds) + 1e-9)
-    motion = Motion({"v": [turning, turning], "tau": [turning, turning]})
-    comparison = comparing(motion, np.tile(turning, 2))
-    assert over_time(comparison, left(np.concatenate([drift, 0.5 * drift]))) == "time"
-    assert over_time(comparison, left(np.tile(turning * drift, 2))) == "friction level over time"
-    assert over_time(comparison, left(np.concatenate([turning * drift, 0.5 * drift]))) == "friction level over time"
-
-
-def test_what_begins_late_in_a_recording_counts_as_what_is_there_from_its_start() -> None:
-    seconds = np.arange(8 * RATE) / RATE
-    turning = np.sign(np.sin(2 * np.pi * seconds) + 1e-9)
-    motion = Motion({"v": [turning], "tau": [turning]})
-    late = np.clip(seconds - 4, 0, 1)
-    early = 0.2 * np.clip(2 - seconds, 0, 1)
-    comparison = comparing(motion, turning)
-    assert over_time(comparison, left(late + turning * early)) == "time"
-    assert over_time(comparison, left(turning * late + early)) == "friction level over time"
+@pytest.mark.parametrize(
+    ("rests", "shown"),
+    [
+        pytest.param([DRIFT, 0.5 * DRIFT], "time", id="a torque over time"),
+        pytest.param([TURNING * DRIFT] * 2, "friction level over time", id="a friction level over time"),
+        pytest.param([TURNING * DRIFT, 0.5 * DRIFT], "friction level over time", id="the level in the louder one"),
+        pytest.param([LATE + TURNING * EARLY], "time", id="a torque that begins late"),
+        pytest.param([TURNING * LATE + EARLY], "friction level over time", id="a level that begins late"),
+    ],
+)
+def test_a_torque_or_a_friction_level_over_time_whichever_explains_more(
+    rests: list[Array], shown: str, size: float
+) -> None:
+    turning = [TURNING] * len(rests)
+    comparison = comparing(Motion({"v": turning, "tau": turning}), np.concatenate(turning))
+    assert over_time(comparison, left(size * np.concatenate(rests))) == shown
 
 
 @pytest.mark.parametrize("axis", ["q", "v", "tau"])
@@ -124,6 +121,6 @@ def test_what_is_left_where_training_never_was_is_nothing_left(axis: str) -> Non
     comparison, rest = comparing(steady(4), 2.0), np.repeat([0.0, 1.0], 2 * RATE)
     rows = {"q": np.zeros(4 * RATE), "v": np.ones(4 * RATE), "tau": np.full(4 * RATE, TORQUE)}
     inside = elsewhere(**{name: one.copy() for name, one in rows.items()})
-    assert share_there(comparison, RIGHT_LONG, rest, inside) > 0.3
+    assert share_there(comparison, RIGHT, rest, inside) > 0.3
     rows[axis][2 * RATE :] += 0.1
-    assert share_there(comparison, RIGHT_LONG, rest, elsewhere(**rows)) < 0.01
+    assert share_there(comparison, RIGHT, rest, elsewhere(**rows)) < 0.01

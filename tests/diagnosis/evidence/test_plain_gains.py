@@ -1,35 +1,31 @@
 """The plain held-out error of a real model in both bands: what errs in one of them alone does not stand."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from problems import compared, problem_of
+from wandering import axis, recorded
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decide.decision import Gain, held_out_rules
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence import predictive
-from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive, _beyond, reading_noise
 from cosim.estimation.prepare import prepare
-from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import residuals
 from pyfmi_models.effects import Cogging, Effect, TorqueOffset
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
+from pyfmi_models.friction import Frictionless
 
 SECONDS, RATE, NOISE = 40, 200, 0.1
 NARROW, WIDE = 10.0, 30.0
 CYCLES = 16.0 / 2 * 2 * np.pi
 """Of a ripple at 12 to 20 Hz where the axis turns at 2 rad/s: above the one band and below the other."""
 FAST, SLOW = 0.08, 0.03
-
-
-def axis(*effects: Effect) -> Mount:
-    return Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0), effects=effects)
 
 
 def ripple(amplitude: float) -> Cogging:
@@ -40,26 +36,25 @@ def offset(torque: float) -> TorqueOffset:
     return TorqueOffset(torque=torque)
 
 
-def recorded(seed: int, fast: float, slow: float, hum: float = 0.0) -> Recording:
+def turning(seed: int, fast: float, slow: float, hum: float = 0.0) -> Recording:
     """Steady turning with a ripple and an offset of these sizes; a hum at 20 Hz is in no model."""
     t = np.arange(SECONDS * RATE) / RATE
     q, v, a = 2 * t - np.cos(0.5 * t), 2 + 0.5 * np.sin(0.5 * t), 0.25 * np.cos(0.5 * t)
     noise = NOISE * np.random.default_rng(seed).standard_normal(len(t))
     extra = fast * np.cos(CYCLES * q) + slow + hum * np.sin(2 * np.pi * 20 * t)
-    return Recording("run", {"t": t, "q": q, "tau": 5 * a + 2 + v + extra + noise})
+    return recorded(5 * a + 2 + v + extra + noise, t, q)
 
 
 @cache
 def held(fast: float, slow: float, hum: float = 0.0, band: float = NARROW) -> Predictive:
     """A recording with these in it, held out from a base that knows of none."""
-    prepared = prepare([recorded(1, 0.0, 0.0)], band)
-    problem = Problem(axis(), prepared, np.ones(len(prepared.recording_of)), 1 / RATE)
-    base, runs = problem.fit(axis(), 10), [recorded(2, fast, slow, hum)]
-    return Predictive.of(Comparison.of(problem, base, POLICY), prepare(runs, band), base, prepare(runs, WIDE))
+    comparison, base = compared(problem_of(axis(), turning(1, 0.0, 0.0), cutoff=band, slow=0.0), 10)
+    runs = [turning(2, fast, slow, hum)]
+    return Predictive.of(comparison, prepare(runs, band), base, prepare(runs, WIDE))
 
 
 def gains(this: Predictive, *effects: Effect) -> tuple[float, float]:
-    return this.plain_gains(axis(), axis(*effects))
+    return this.plain_gains(axis(), axis(effects=effects))
 
 
 def is_vetoed(narrow: float, wide: float) -> bool:
@@ -106,25 +101,19 @@ def test_the_wider_band_comes_last_though_it_be_that_of_the_analysis() -> None:
     assert is_vetoed(narrow, wide)
 
 
-def swinging(seconds: float, position: bool) -> dict[str, np.ndarray]:
-    t = np.arange(seconds * RATE) / RATE
-    q, v, a = 0.5 * np.sin(t), 0.5 * np.cos(t), -0.5 * np.sin(t)
-    return {"t": t, "tau": 5 * a + 2 * np.sign(v) + v, **({"q": q} if position else {"v": v})}
-
-
-@pytest.mark.parametrize("position", [True, False])
+@pytest.mark.parametrize(("name", "size"), [("q", 1e-4), ("v", 2e-3)])
 @pytest.mark.parametrize("band", [NARROW, WIDE])
-def test_the_noise_of_a_reading_makes_the_torque_that_is_predicted(position: bool, band: float) -> None:
+def test_the_noise_of_a_reading_makes_the_torque_that_is_predicted(name: str, size: float, band: float) -> None:
     """The residual with noise in the reading less that without; the noise itself is estimated from differences.
 
     That estimate is 6 % low here, its energy 12 %; a spectrum of one side, half of it, would be seen.
     """
-    table, name = swinging(200, position), "q" if position else "v"
-    noise = (1e-4 if position else 2e-3) * np.random.default_rng(4).standard_normal(len(table["t"]))
-    clean, noisy = (
-        prepare([Recording("run", table | {name: table[name] + one})], band) for one in (np.zeros_like(noise), noise)
-    )
-    frictionless = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=0.0, sigma2=0.0))
+    t = np.arange(200 * RATE) / RATE
+    v, true = 0.5 * np.cos(t), {"q": 0.5 * np.sin(t), "v": 0.5 * np.cos(t)}[name]
+    table = {"t": t, "tau": -2.5 * np.sin(t) + 2 * np.sign(v) + v}
+    noise = size * np.random.default_rng(4).standard_normal(len(t))
+    clean, noisy = (prepare([Recording("run", table | {name: true + one})], band) for one in (0 * noise, noise))
+    frictionless = replace(axis(), friction=Frictionless())
     made = [residuals(one, frictionless)[0][one.pieces[0].kept] for one in (clean, noisy)]
     assert reading_noise(noisy, frictionless) == pytest.approx(float(np.mean((made[1] - made[0]) ** 2)), rel=0.15)
 
@@ -134,6 +123,16 @@ def test_the_noise_of_a_reading_makes_the_torque_that_is_predicted(position: boo
 )
 def test_noise_takes_at_most_nine_tenths_of_an_error(energy: float, noise: float, left: float) -> None:
     assert _beyond(energy, noise) == pytest.approx(left)
+
+
+def stand_in(weight: np.ndarray, narrow: tuple[float, float], wide: tuple[float, float]) -> tuple[Any, Any, Any]:
+    """A recording in which two mounts, which come second and third, leave these energies in both bands."""
+    mounts = axis(), axis(effects=(offset(1.0),))
+    size, energy = dict(zip(mounts, narrow, strict=True)), dict(zip(mounts, wide, strict=True))
+    this: Any = SimpleNamespace(weight=weight, halved=0.5)
+    this.prepared, this.protocol = SimpleNamespace(cutoff=NARROW), SimpleNamespace(cutoff=WIDE)
+    this.residual, this._protocol_energy = (lambda one: np.full(4, size[one] ** 0.5)), energy.__getitem__
+    return this, *mounts
 
 
 @pytest.mark.parametrize(
@@ -150,22 +149,14 @@ def test_a_model_may_amplify_noise_twofold_or_must_halve_the_error(
     narrow: tuple[float, float], wide: tuple[float, float], both: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(predictive, "reading_noise", lambda *_: 0.0)
-    before, after = axis(), axis(offset(1.0))
-    size, energy = dict(zip((before, after), narrow, strict=True)), dict(zip((before, after), wide, strict=True))
-    this: Any = SimpleNamespace(weight=np.ones(4), halved=0.5)
-    this.prepared, this.protocol = SimpleNamespace(cutoff=NARROW), SimpleNamespace(cutoff=WIDE)
-    this.residual, this._protocol_energy = (lambda one: np.full(4, size[one] ** 0.5)), energy.__getitem__
+    this, before, after = stand_in(np.ones(4), narrow, wide)
     assert Predictive.plain_gains(this, before, after) == pytest.approx(both)
 
 
 def test_noise_counts_by_the_share_of_the_rows_that_are_weighed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows without weight have no error in the narrow band, and so no noise either."""
     monkeypatch.setattr(predictive, "reading_noise", lambda *_: 0.8)
-    this: Any = SimpleNamespace(weight=np.array([1.0, 1.0, 0.0, 0.0]), halved=0.5)
-    this.prepared, this.protocol = SimpleNamespace(cutoff=NARROW), SimpleNamespace(cutoff=WIDE)
-    before, after = axis(), axis(offset(1.0))
-    size = {before: 1.0, after: 0.98}
-    this.residual, this._protocol_energy = (lambda one: np.full(4, size[one])), {before: 1.5, after: 1.4}.__getitem__
+    this, before, after = stand_in(np.array([1.0, 1.0, 0.0, 0.0]), (1.0, 0.98**2), (1.5, 1.4))
     narrow, wide = Predictive.plain_gains(this, before, after)
     assert narrow == pytest.approx(1 - (0.5 * 0.98**2 - 0.5 * 0.8) / (0.5 - 0.5 * 0.8))
     assert wide == pytest.approx(1 - (1.4 - 0.8) / (1.5 - 0.8))

@@ -2,42 +2,32 @@
 
 import numpy as np
 import pytest
-from learned_cases import FC, Array, Extra, night
+from learned_cases import FC, Array, Extra, recording
+from problems import compared
+from wandering import axis
 
-from cosim.data.recording import Recording
 from cosim.diagnosis.answer.scores import ResidualScores, Scores
 from cosim.diagnosis.decide.decision import Decision, decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
-from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.flagged import Residual, flagged, loud_states, noise_at
 from cosim.diagnosis.terms.flexible import flexible_terms
 from cosim.estimation.discrepancy_basis import last_reversal
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
 
 
 def recorded(extra: Extra, *seeds: int) -> Prepared:
     """Nights whose torque has something that the base lacks."""
-    recordings = []
-    for seed in seeds:
-        now = night(seed)
-        tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now)
-        recordings.append(Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau}))
-    return prepare(recordings, 10.0)
+    return prepare([recording(extra, seed, noise=0.0) for seed in seeds], 10.0)
 
 
 def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     """What the base, refitted to two nights, leaves of a torque that it lacks; nothing is named."""
-    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
     prepared, there = recorded(extra, 1, 2), recorded(extra, 3)
     v = np.abs(prepared.stacked("v"))
-    problem = Problem(mount, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
-    base = problem.fit(mount, 25)
-    comparison = Comparison.of(problem, base, POLICY)
+    comparison, base = compared(Problem(axis(), prepared, np.asarray(v > 0.02 * v.max(), float), 0.01))
     held = Predictive.of(comparison, there, base, there)
     rest = held.residual(base.mount)
     sizes = share_left(comparison, base), share_there(comparison, base, rest, held)
