@@ -1,4 +1,4 @@
-"""Algorithms keep their closed forms, in C and in Python with the same bits."""
+"""Algorithms keep their closed forms and choose their pieces, in C and in Python with the same bits."""
 
 import re
 from collections.abc import Mapping
@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator
-from simulating import pair, simulate
+from simulating import alone, pair, simulate
 from tiny_fmu import described, description
 from two_mass import START, export
 
+from cosim.master.loop.coupling import _fitting, _growth
 from cosim.master.result import RunResult
 from cosim.support.errors import StepError, WiringError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
@@ -132,13 +133,7 @@ def test_the_split_mount_meets_the_whole_one_as_far_as_the_algorithm_goes(
     wires = [("far.torque", "near.disturbance"), ("near.v", "far.v"), ("tau", "near.tau")]
     two = {"near": halves["near"], "far": halves["far"]}
     split = simulate(two, wires, record={"v": "near.v"}, parameters=start, algorithm=algorithm, **common)
-    whole = simulate(
-        {"whole": halves["whole"]},
-        [("tau", "whole.tau")],
-        record={"v": "whole.v"},
-        parameters={"whole": {"speed": START}},
-        **common,
-    )
+    whole = alone(halves["whole"], [("tau", "one.tau")], {"v": "one.v"}, parameters={"one": {"speed": START}}, **common)
     assert least <= np.abs(split.recording["v"] - whole.recording["v"]).max() <= most
 
 
@@ -193,38 +188,95 @@ def test_components_that_do_not_agree_are_named(direct: Path, compiled: bool) ->
         amplifiers(direct, algorithm, signals=jump, compiled=compiled)
 
 
-MISTAKES: list[tuple[Any, Mapping[str, int], str]] = [
+MISTAKES: list[tuple[Any, Mapping[str, Any], str]] = [
     (GaussSeidel(kind="gauss-seidel", order=("mass",)), {}, "it must name each component once: mass, spring."),
     (Iterated(kind="iterated", components=("mas",)), {}, 'algorithm.components names "mas", which is no component'),
-    (Iterated(kind="iterated"), {"mass": 2}, '"mass" steps every 2 ticks; components that are coupled must step at'),
-    (Jacobi(), {"mas": 2}, '"mas" is given a step, but is no component; components are: mass, spring.'),
-    (Jacobi(), {"mass": 0}, '"mass" shall step every 0 ticks; that must be a whole number from 1 on.'),
+    (Iterated(kind="iterated"), {"every": 2}, '"mass" steps every 2 ticks; components that are coupled must step at'),
+    (Iterated(kind="iterated"), {"state": False}, '"mass" cannot save and restore its state, which the iterated alg'),
+    (Jacobi(), {"every": 0}, '"mass" shall step every 0 ticks; that must be a whole number from 1 on.'),
     (Energy(kind="energy", bonds=BOND), {}, 'The bond of "mass.y" [rad] and "spring.y" [rad] is no power; their'),
     (Energy(kind="energy", bonds=(("mass.y", "mass.y"),)), {}, 'The bond of "mass.y" and "mass.y" needs a wire from'),
+    (Energy(kind="energy", bonds=BOND), {"can_vary_step": False}, '"mass" takes steps of one length only, and the ene'),
 ]
 
 
-@pytest.mark.parametrize(("algorithm", "every", "sentence"), MISTAKES)
+@pytest.mark.parametrize(("algorithm", "what", "sentence"), MISTAKES)
 def test_an_algorithm_that_does_not_fit_is_refused(
-    tiny: Tiny, algorithm: Any, every: Mapping[str, int], sentence: str
+    tiny: Tiny, tmp_path: Path, algorithm: Any, what: dict[str, Any], sentence: str
 ) -> None:
+    every = {"mass": what["every"]} if "every" in what else {}
+    told = description(3, **{name: value for name, value in what.items() if name != "every"})
+    told = told.replace(' unit="rad"', "") if "can_vary_step" in what else told  # so that the bond is none of units
     with pytest.raises(WiringError, match=re.escape(sentence)):
-        oscillator(tiny[3], algorithm, every=every)
+        oscillator(described(tiny[3], tmp_path / "odd.fmu", told), algorithm, every=every)
 
 
-def test_iteration_needs_components_that_can_be_taken_back(tiny: Tiny, tmp_path: Path) -> None:
-    fmu = described(tiny[2], tmp_path / "forward.fmu", description(2, state=False))
-    with pytest.raises(WiringError, match='"mass" cannot save and restore its state, which the iterated algorithm'):
-        oscillator(fmu, Iterated(kind="iterated"))
-
-
-def test_pieces_of_a_step_need_components_that_take_them(plain: Tiny, tmp_path: Path) -> None:
-    fmu = described(plain[3], tmp_path / "stiff.fmu", description(3, can_vary_step=False))
-    with pytest.raises(WiringError, match='"mass" takes steps of one length only, and the energy algorithm cuts them'):
-        oscillator(fmu, Energy(kind="energy", bonds=BOND))
-
-
-def test_a_quantised_wire_is_not_iterated(tiny: Tiny) -> None:
+def test_steps_of_a_component_that_is_none_and_quantised_iteration_are_refused(tiny: Tiny) -> None:
+    with pytest.raises(WiringError, match='"mas" is given a step, but is no component; components are: mass, spring'):
+        oscillator(tiny[3], Jacobi(), every={"mas": 2})
     wires = [Wire("one.y", "two.a", quantum=0.1), Wire("two.y", "one.a")]
     with pytest.raises(WiringError, match=r'The wire to "two.a" is quantised; values that are iterated must be smooth'):
-        pair(tiny[3], wires, {"y": "one.y"}, step=1.0, ticks=1, algorithm=Iterated(kind="iterated"))
+        pair(tiny[3], wires, {"y": "one.y"}, algorithm=Iterated(kind="iterated"))
+
+
+# What couplings choose by: sizes of pieces, their growth with the error.
+
+
+@pytest.mark.parametrize("error", [0.03, 0.4, 1.0, 3.0, 20.0])
+@pytest.mark.parametrize("before", [0.02, 0.7, 5.0])
+def test_a_piece_grows_by_the_error_and_by_how_it_changed_within_bounds(before: float, error: float) -> None:
+    """A PI controller of the step: 0.9 error^(-3/8) before^(1/4), between a fifth and one and a half."""
+    assert _growth(before, error) == pytest.approx(np.clip(0.9 * error**-0.375 * before**0.25, 0.2, 1.5), rel=1e-14)
+    assert _growth(before, 0.0) == 1.5, "without an error it grows most"
+    assert _growth(0.0, 2.0) == pytest.approx(0.9 * 2**-0.125, rel=1e-14), "the first has none before it"
+
+
+@pytest.mark.parametrize("most", [1, 2, 8, 16])
+def test_a_piece_is_the_largest_power_of_two_that_fits_its_size_and_its_place(most: int) -> None:
+    for size in (1.0, 1.99, 2.0, 3.5, 4.0, 7.9, 8.0, 16.0, 40.0):
+        for position in range(most):
+            fits = [2**k for k in range(5) if 2**k <= min(size, most) and position % 2**k == 0]
+            assert _fitting(size, position, most) == max(fits)
+
+
+ENERGIES = [{"tolerance": 1e-3, "max_pieces": 1}, {"tolerance": 1e-3}, {"tolerance": 1e-5, "max_pieces": 4}]
+ENERGIES += [{"tolerance": 3e-7, "max_pieces": 1024}]
+ITERATIONS = [{"theta": 0.0, "tolerance": 1e-3}, {"theta": 0.3, "tolerance": 1e-6}, {"theta": 1.0, "tolerance": 1e-14}]
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        *(Energy(kind="energy", bonds=BOND, **options) for options in ENERGIES),
+        *(Iterated(kind="iterated", **options) for options in ITERATIONS),
+    ],
+)
+def test_python_and_c_take_the_same_pieces_and_rounds_to_the_same_bits(plain: Tiny, algorithm: Any) -> None:
+    """Stiff, soft and at rest until its first row: each way the power on the bond is another."""
+    for version, k in ((2, 0.3), (3, 7.0)):
+        parameters = {"mass": {"k": k}, "spring": {"k": k}}
+        one, other = (
+            oscillator(plain[version], algorithm, ticks=40, compiled=compiled, parameters=parameters, decimation=3)
+            for compiled in (True, False)
+        )
+        assert one.statistics["coupling"] == other.statistics["coupling"]
+        assert one.statistics["notes"] == [note for note in other.statistics["notes"] if "ran in Python" not in note]
+        for name in one.recording:
+            np.testing.assert_array_equal(one.recording[name], other.recording[name])
+
+
+def test_a_coupling_at_rest_takes_the_fewest_pieces_and_rounds(plain: Tiny) -> None:
+    """Nothing moves, so nothing is lost: the first tick begins with one piece of 8, then pieces grow by half."""
+    algorithm = Energy(kind="energy", bonds=BOND, tolerance=1e-6, max_pieces=8)
+    for compiled in (True, False):
+        run = oscillator(plain[3], algorithm, ticks=20, compiled=compiled, parameters={"mass": {"k": 0.0}})
+        (effort,) = run.statistics["coupling"]
+        sizes, size, position = [], 1.0, 0
+        while sum(sizes) < 20 * 8:
+            sizes.append(_fitting(size, position, 8))
+            position, size = (position + sizes[-1]) % 8, min(1.5 * size, 8.0)
+        assert effort["rounds"] == len(sizes)
+        assert effort["greatest"] == max(np.unique(np.cumsum([0, *sizes[:-1]]) // 8, return_counts=True)[1])
+        assert effort["at_limit"] == 0
+    iterated = oscillator(plain[3], Iterated(kind="iterated"), ticks=20, parameters={"mass": {"k": 0.0}})
+    assert iterated.statistics["coupling"] == [{"rounds": 20, "greatest": 1, "at_limit": 0}]

@@ -1,11 +1,11 @@
 """A run that is watched from outside: when a call counts as overdue, and what is said of a process that is gone."""
 
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from test_isolation import FUNCTION
 
 from cosim.master.isolated import Call, Watch, run_isolated
 from cosim.master.loop.structures import CLoop
@@ -34,44 +34,47 @@ def loop(board: Board) -> Any:
     return board.loop(CLoop, ["controller", "plant"])
 
 
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def watch(board: Board, loop: Any, clock: Clock) -> Watch:
+    """It begins while tick 7 of the plant is stepped; a call may take two seconds."""
+    stepping(loop, 1, 7)
+    return Watch(board, 0.001, 2.0, clock)
+
+
 def stepping(loop: Any, part: int, tick: int) -> None:
     """As the loop says whose functions it calls: see `enter` in part.h."""
     loop.status, loop.tick = -1 - part, tick
 
 
-def test_a_call_is_overdue_once_it_took_longer_than_it_may(board: Board, loop: Any) -> None:
-    clock = Clock()
-    stepping(loop, 1, 7)
-    watch = Watch(board, 0.001, 2.0, clock)
-    for now, reason in ((101.0, ""), (102.0, ""), (102.001, "a call did not return")):
-        clock.now = now
-        assert watch.overdue() == reason
+def overdue_after(watch: Watch, clock: Clock, seconds: float) -> str:
+    clock.now += seconds
+    return watch.overdue()
 
 
-@pytest.mark.parametrize("go_on", [lambda loop: stepping(loop, 0, 7), lambda loop: stepping(loop, 1, 8)])
-def test_a_loop_that_goes_on_has_its_time_anew(board: Board, loop: Any, go_on: Callable[[Any], None]) -> None:
-    clock = Clock()
-    stepping(loop, 1, 7)
-    watch = Watch(board, 0.001, 2.0, clock)
+def test_a_call_is_overdue_once_it_took_longer_than_it_may(watch: Watch, clock: Clock) -> None:
+    assert [overdue_after(watch, clock, seconds) for seconds in (1.0, 1.0)] == ["", ""]
+    assert overdue_after(watch, clock, 0.001) == "a call did not return"
+
+
+@pytest.mark.parametrize(("part", "tick"), [(0, 7), (1, 8)])
+def test_a_loop_that_goes_on_has_its_time_anew(watch: Watch, clock: Clock, loop: Any, part: int, tick: int) -> None:
     clock.now += 1.5
-    go_on(loop)
-    assert watch.overdue() == ""
-    clock.now += 1.5
-    assert watch.overdue() == ""
-    clock.now += 1.0
-    assert watch.overdue() != ""
+    stepping(loop, part, tick)
+    assert [overdue_after(watch, clock, seconds) for seconds in (0.0, 1.5)] == ["", ""]
+    assert overdue_after(watch, clock, 1.0) != ""
 
 
-def test_work_between_calls_of_components_is_never_overdue(board: Board, loop: Any) -> None:
-    clock = Clock()
-    watch = Watch(board, 0.001, 2.0, clock)
-    for _ in range(3):
-        clock.now += 100.0
-        assert watch.overdue() == ""
+def test_work_between_calls_of_components_is_never_overdue(watch: Watch, clock: Clock, loop: Any, board: Board) -> None:
+    loop.status = 0
+    assert [overdue_after(watch, clock, 100.0) for _ in range(3)] == ["", "", ""]
     board.write("plant", "loaded")
-    assert watch.overdue() == ""
-    clock.now += 2.5
-    assert watch.overdue() != ""
+    assert overdue_after(watch, clock, 0.0) == ""
+    assert overdue_after(watch, clock, 2.5) != ""
 
 
 def test_what_is_done_with_a_component_comes_before_what_the_loop_said_last(board: Board, loop: Any) -> None:
@@ -119,21 +122,13 @@ def test_a_time_is_said_only_of_a_step_and_a_process_may_end_outside_of_all_call
     assert str(error).startswith("odd ended its process with exit code 1 while it was loaded; a component must return")
 
 
-SPEAKING = """
-[components.odd]
-python = "odd.py:odd"
-inputs = { q = "rad" }
-outputs = { seen = "rad" }
-"""
-
-
 def test_what_a_component_writes_is_shown_and_progress_is_told(
     scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "odd.py").write_text(
         "import sys\nsys.stderr.write('heard from odd\\n')\n\ndef odd(t, q):\n    return q\n"
     )
-    scenario.write_text(scenario.read_text() + SPEAKING)
+    scenario.write_text(scenario.read_text() + FUNCTION)
     told: list[tuple[int, int]] = []
     given: Scenario = read_scenario(scenario)
     run_isolated(given, Options(tmp_path / "a.parquet", on_progress=lambda done, of: told.append((done, of))))

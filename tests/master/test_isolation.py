@@ -10,7 +10,9 @@ import sys
 import tempfile
 import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from commands import ENVIRONMENT, call
@@ -19,7 +21,9 @@ from cosim.data.recording import Recording
 from cosim.master.isolated import run_isolated
 from cosim.master.simulate import Options
 from cosim.support.activity import SIZE, Board
-from cosim.support.errors import LostComponentError
+from cosim.support.errors import LostComponentError, OutputError
+from cosim.support.files import replacing
+from cosim.support.lock import claimed
 from cosim.support.scratch import PREFIX
 from cosim.system.scenario import read_scenario
 
@@ -67,18 +71,13 @@ def left(folder: Path) -> list[str]:
         (12, "did not return within 0.5 s while it was stepped at tick 300 (0.3 s);"),
     ],
 )
-@pytest.mark.parametrize("loop", [(), ("--interpreted",)])
+@pytest.mark.parametrize("loop", [[], ["--interpreted"]])
 def test_an_fmu_that_ends_its_process_costs_a_sentence_and_leaves_nothing(
-    scenario: Path,
-    temporary: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    status: int,
-    sentence: str,
-    loop: tuple[str, ...],
+    scenario: Path, temporary: Path, capsys: pytest.CaptureFixture[str], status: int, sentence: str, loop: list[str]
 ) -> None:
     written(scenario, f"fail_at = 0.3, status = {status}")
-    assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5, *loop) == 2
+    out = scenario.with_name("out")
+    assert call("run", scenario, "--out", out, "--call-timeout", 0.5, *loop) == 2
     said = capsys.readouterr()
     assert said.out == ""
     last = said.err.splitlines()[-1]
@@ -86,30 +85,30 @@ def test_an_fmu_that_ends_its_process_costs_a_sentence_and_leaves_nothing(
     assert sentence in last
     assert last.endswith("Nothing was recorded.")
     assert left(temporary) == []
-    assert not (tmp_path / "out").exists()
+    assert not out.exists()
+
+
+def command_of(scenario: Path, out: Path) -> list[str]:
+    return [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(out)]
 
 
 @linux
 def test_what_an_fmu_started_ends_with_it(scenario: Path, tmp_path: Path) -> None:
     written(scenario, "fail_at = 0.3, status = 16")
-    mark = f"{ENVIRONMENT['PYTHONPATH']}:{tmp_path}"
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
-    done = subprocess.run(
-        command, env=ENVIRONMENT | {"PYTHONPATH": mark}, cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert "ended its process with exit code 3" in done.stderr
-    assert [pid for pid in processes() if str(tmp_path) in environment_of(pid)] == []
+    given = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}:{tmp_path}"}
+    done = subprocess.run(command_of(scenario, tmp_path / "out"), env=given, capture_output=True, check=False)
+    assert b"ended its process with exit code 3" in done.stderr
+    assert marked(tmp_path) == []
 
 
-def processes() -> list[int]:
-    return [int(one.name) for one in Path("/proc").iterdir() if one.name.isdigit() and int(one.name) != os.getpid()]
-
-
-def environment_of(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/environ").read_bytes().decode("utf-8", "replace")
-    except OSError:
-        return ""
+def marked(mark: Path) -> list[str]:
+    """Other processes in whose environment a path is."""
+    found = []
+    for one in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):
+            if one.parent.name != str(os.getpid()) and os.fsencode(mark) in one.read_bytes():
+                found.append(one.parent.name)
+    return found
 
 
 @linux
@@ -136,48 +135,37 @@ def test_a_library_that_is_cut_short_is_named(
         ("import os\ndef odd(t, q): os._exit(0)", "ended its process with exit code 0 while it was stepped at tick 0"),
         ("import os\nos._exit(0)", "odd.py ended its process with exit code 0 while it was loaded;"),
         ("import sys\nsys.exit(0)", "the file cannot be run: SystemExit: 0."),
-        ("def odd(t, q):\n  while True: pass", "odd (odd.py:odd) did not return within 0.5 s while it was stepped"),
+        ("def odd(t, q):\n  while True: pass", "odd.py:odd) did not return within 0.5 s while it was stepped"),
         ("while True: pass", "odd.py did not return within 0.5 s while it was loaded;"),
         ("class odd:\n  def __init__(self): raise OSError('no')", "odd cannot be made: OSError: no."),
         ("class odd:\n  def __init__(self): raise SystemExit", "odd cannot be made: SystemExit: SystemExit."),
     ],
 )
 def test_a_function_that_ends_its_process_costs_a_sentence(
-    scenario: Path,
-    temporary: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    text: str,
-    sentence: str,
+    scenario: Path, temporary: Path, capsys: pytest.CaptureFixture[str], text: str, sentence: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("odd.py").write_text(text + "\n")
+    scenario.with_name("odd.py").write_text(text + "\n")
     written(scenario, "nan_at = 1e9", FUNCTION)
-    assert call("run", scenario.name, "--out", "out", "--call-timeout", 0.5) == 2
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert sentence in last
+    assert call("run", scenario, "--out", scenario.with_name("out"), "--call-timeout", 0.5) == 2
+    assert sentence in capsys.readouterr().err.splitlines()[-1]
     assert left(temporary) == []
-    assert "run.json" not in left(tmp_path)
+    assert "run.json" not in left(scenario.parent)
 
 
-def test_isolated_or_not_the_rows_are_the_same(scenario: Path, tmp_path: Path) -> None:
-    for name, option in (("there", "--isolate"), ("here", "--no-isolate")):
-        assert call("run", scenario, "--out", tmp_path / name, option, "--no-page") == 0
-    one, other = (Recording.read(tmp_path / name / "recording.parquet", required=()) for name in ("there", "here"))
-    assert all((one[name] == other[name]).all() for name in one)
-    assert one.origin["complete"] is True
-
-
-def test_a_failure_that_is_said_is_the_same_sentence(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("parameters", "code", "rows"), [("nan_at = 1e9", 0, 250), ("fail_at = 0.3", 2, 151)])
+def test_isolated_or_not_the_rows_and_the_sentences_are_the_same(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], parameters: str, code: int, rows: int
 ) -> None:
-    written(scenario, "fail_at = 0.3")
-    said = []
-    for name, option in (("there", "--isolate"), ("here", "--no-isolate")):
-        assert call("run", scenario, "--out", tmp_path / name, option) == 2
-        said.append(capsys.readouterr().err.splitlines()[-1])
-        assert len(Recording.read(tmp_path / name / "recording.parquet", required=())) == 151
+    written(scenario, parameters)
+    found, said = [], []
+    for name in ("isolate", "no-isolate"):
+        assert call("run", scenario, "--out", tmp_path / name, f"--{name}", "--no-page") == code
+        said.append([one for one in capsys.readouterr().err.splitlines() if one.startswith("cosim: ")])
+        found.append(Recording.read(tmp_path / name / "recording.parquet", required=()))
+    one, other = found
+    assert len(one) == len(other) == rows
+    assert all((one[name] == other[name]).all() for name in one)
+    assert one.origin["complete"] is (code == 0)
     assert said[0] == said[1]
 
 
@@ -189,8 +177,8 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
 ) -> None:
     written(scenario, "fail_at = 0.3, status = 12" if hang else "nan_at = 1e9")
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
     environment = ENVIRONMENT | {"TMPDIR": str(temporary)}
+    command = command_of(scenario, tmp_path / "out")
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 30
     while time.monotonic() < until and not list((tmp_path / "out").glob(".*.partial")):
@@ -203,9 +191,9 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
     assert said.endswith(word)
     assert "Traceback" not in said
     until = time.monotonic() + 10
-    while time.monotonic() < until and [pid for pid in processes() if str(temporary) in environment_of(pid)]:
+    while time.monotonic() < until and marked(temporary):
         time.sleep(0.05)
-    assert [pid for pid in processes() if str(temporary) in environment_of(pid)] == []
+    assert marked(temporary) == []
     assert left(temporary) == []
     files = [name for name in left(tmp_path / "out") if name != ".cosim.lock"]
     assert files == ["recording.parquet"] or (hang and files == [])  # a late computer interrupts before it hangs
@@ -219,8 +207,7 @@ def test_the_second_of_two_runs_into_one_folder_is_refused_while_the_first_lives
 ) -> None:
     long = tmp_path / "long.toml"
     long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    command = [sys.executable, "-m", "cosim", "run", str(long), "--out", str(tmp_path / "out")]
-    first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.DEVNULL)
+    first = subprocess.Popen(command_of(long, tmp_path / "out"), env=ENVIRONMENT, stderr=subprocess.DEVNULL)
     until = time.monotonic() + 120
     while time.monotonic() < until and first.poll() is None and not list((tmp_path / "out").glob(".*.partial")):
         time.sleep(0.02)
@@ -238,9 +225,6 @@ def test_the_second_of_two_runs_into_one_folder_is_refused_while_the_first_lives
 
 
 def test_a_file_that_came_into_being_meanwhile_is_not_replaced(tmp_path: Path) -> None:
-    from cosim.support.errors import OutputError
-    from cosim.support.files import replacing
-
     path = tmp_path / "card.toml"
 
     def write() -> None:
@@ -277,8 +261,6 @@ def test_a_board_tells_another_process_what_is_done(tmp_path: Path) -> None:
 
 @linux
 def test_what_a_killed_process_left_half_written_goes_with_the_next_run(tmp_path: Path) -> None:
-    from cosim.support.lock import claimed
-
     ended = subprocess.Popen([sys.executable, "-c", "pass"])
     ended.wait()
     for name in (f".a.parquet.{ended.pid}.partial", f".a.parquet.{os.getpid()}.partial", ".x.partial"):
@@ -289,9 +271,6 @@ def test_what_a_killed_process_left_half_written_goes_with_the_next_run(tmp_path
 
 
 def test_a_lock_survives_the_file_being_removed(tmp_path: Path) -> None:
-    from cosim.support.errors import OutputError
-    from cosim.support.lock import claimed
-
     with claimed(tmp_path / "out", "run"):
         with pytest.raises(OutputError, match="Another run is writing"), claimed(tmp_path / "out", "run"):
             pass
@@ -301,43 +280,47 @@ def test_a_lock_survives_the_file_being_removed(tmp_path: Path) -> None:
     assert left(tmp_path) == []
 
 
+def child(board: Path, parent: int, call: bytes | None = None) -> "subprocess.Popen[bytes]":
+    """Start a process for work whose parent has a number; without a call its input stays open."""
+    command = [sys.executable, "-m", "cosim.support.child", str(board), str(parent)]
+    pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes)
+    assert process.stdin is not None
+    if call is not None:
+        process.stdin.write(call)
+        process.stdin.flush()
+    return process
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A folder with a board, as a parent makes it for its child."""
+    folder = tmp_path / f"{PREFIX}own"
+    folder.mkdir()
+    (folder / "board").write_bytes(bytes(SIZE))
+    return folder
+
+
 @linux
 @pytest.mark.parametrize("call", [b"", b"\x80\x05\x95\xff\xff", pickle.dumps((print, ("heard",)))[:-5]])
 @pytest.mark.parametrize("orphan", [False, True])
 def test_a_process_whose_parent_is_gone_in_the_middle_of_a_call_ends_without_a_trace(
-    tmp_path: Path, call: bytes, orphan: bool
+    own: Path, call: bytes, orphan: bool
 ) -> None:
-    folder = tmp_path / f"{PREFIX}own"
-    folder.mkdir()
-    (folder / "board").write_bytes(bytes(SIZE))
-    parent = ["1"] if orphan else [str(os.getpid())]  # one that ended before its child had begun
-    command = [sys.executable, "-m", "cosim.support.child", str(folder / "board"), *parent]
-    done = subprocess.run(
-        command, env=ENVIRONMENT, input=call, capture_output=True, start_new_session=True, timeout=60, check=False
-    )
-    assert done.stderr == b""
-    assert not folder.exists()
+    """An orphan's parent ended before its child had begun."""
+    assert child(own / "board", 1 if orphan else os.getpid(), call).communicate(timeout=60)[1] == b""
+    assert not own.exists()
 
 
 @linux
-def test_a_process_whose_parent_was_gone_before_it_began_does_not_work_on(tmp_path: Path) -> None:
-    folder = tmp_path / f"{PREFIX}own"
-    folder.mkdir()
-    (folder / "board").write_bytes(bytes(SIZE))
-    command = [sys.executable, "-m", "cosim.support.child", str(folder / "board"), "1"]
-    process = subprocess.Popen(command, env=ENVIRONMENT, stdin=subprocess.PIPE, start_new_session=True)
-    assert process.stdin is not None
-    process.stdin.write(pickle.dumps((time.sleep, (600.0,))))
-    process.stdin.flush()
-    process.wait(60)
-    process.stdin.close()
-    assert not folder.exists()
+def test_a_process_whose_parent_was_gone_before_it_began_does_not_work_on(own: Path) -> None:
+    with child(own / "board", 1, pickle.dumps((time.sleep, (600.0,)))) as process:
+        process.wait(60)
+    assert not own.exists()
 
 
 def test_a_process_whose_folder_is_gone_before_it_is_ready_ends_without_a_word(tmp_path: Path) -> None:
     """Ctrl-C may come so early that the parent has tidied up when its process looks for what they share."""
-    command = [sys.executable, "-m", "cosim.support.child", str(tmp_path / "gone" / "activity"), str(os.getpid())]
-    done = subprocess.run(
-        command, env=ENVIRONMENT, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60, check=False
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    process = child(tmp_path / "gone" / "activity", os.getpid())
+    assert process.communicate(timeout=60) == (b"", b"")
+    assert process.returncode == 0

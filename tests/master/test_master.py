@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulating import simulate
+from simulating import alone, simulate
 from tiny_fmu import description
 
 import cosim.master.execution
@@ -44,15 +44,8 @@ def control_loop(fmu: Path, ticks: int = 500, **changes: Any) -> RunResult:
 
 @VERSIONS
 def test_an_integrator_with_feedback_follows_its_closed_form(tiny: Tiny, version: int) -> None:
-    run = simulate(
-        {"one": tiny[version]},
-        [("r", "one.a"), ("one.y", "one.b")],
-        record={"y": "one.y"},
-        step=1e-3,
-        ticks=2000,
-        signals={"r": 1.0},
-        parameters={"one": {"k": 4.0}},
-    )
+    given: dict[str, Any] = {"step": 1e-3, "ticks": 2000, "signals": {"r": 1.0}, "parameters": {"one": {"k": 4.0}}}
+    run = alone(tiny[version], [("r", "one.a"), ("one.y", "one.b")], {"y": "one.y"}, **given)
     np.testing.assert_allclose(run.recording["y"], 1 - (1 - 4e-3) ** np.arange(2000), rtol=1e-12, atol=1e-15)
 
 
@@ -73,7 +66,7 @@ def test_a_mean_is_over_the_sample_interval_centred_at_the_row(tiny: Tiny, decim
     values = np.random.default_rng(2).standard_normal(100)
     record = {"mean": Record("r", "mean"), "sample": Record("r")}
     settings: dict[str, Any] = {"decimation": decimation, "signals": {"r": values}, "compiled": compiled}
-    run = simulate({"one": tiny[2]}, [("r", "one.a")], record=record, step=0.5, ticks=100, **settings)
+    run = alone(tiny[2], [("r", "one.a")], record, step=0.5, ticks=100, **settings)
     halves, centres = np.repeat(values, 2), 2 * decimation * np.arange(len(run.recording))
     windows = [halves[max(centre - decimation, 0) : centre + decimation] for centre in centres]
     np.testing.assert_allclose(run.recording["mean"], [window.mean() for window in windows], rtol=1e-12, atol=1e-15)
@@ -89,11 +82,13 @@ def test_time_is_counted_not_summed_and_chunks_do_not_matter(tiny: Tiny, monkeyp
         np.testing.assert_array_equal(whole.recording[name], pieces.recording[name])
 
 
-def test_progress_is_told_to_the_end(tiny: Tiny) -> None:
+def test_progress_is_told_to_the_end_and_inputs_that_nothing_feeds_after_it(tiny: Tiny) -> None:
     seen: list[tuple[int, int]] = []
-    control_loop(tiny[3], ticks=3000, on_progress=lambda done, of: seen.append((done, of)))
+    told = control_loop(tiny[3], ticks=3000, on_progress=lambda done, of: seen.append((done, of))).statistics
     assert seen[-1] == (3000, 3000)
     assert len(seen) > 1
+    assert told["unconnected"] == ["plant.b"]
+    assert (told["steps"], told["rows"], told["notes"]) == (3000, 3000, [])
 
 
 def test_a_streamed_recording_equals_the_one_in_memory_and_tells_its_origin(tiny: Tiny, tmp_path: Path) -> None:
@@ -111,31 +106,8 @@ def test_a_streamed_recording_equals_the_one_in_memory_and_tells_its_origin(tiny
 @VERSIONS
 def test_a_component_can_be_used_again_and_starts_all_over(tiny: Tiny, version: int) -> None:
     with FmuComponent(tiny[version], "plant") as plant:
-        wires = [("r", "plant.a")]
-        settings: dict[str, Any] = {"record": {"y": "plant.y"}, "step": 0.1, "ticks": 10, "signals": {"r": 1.0}}
-        first, second = (simulate({"plant": plant}, wires, **settings).recording["y"] for _ in range(2))
-    np.testing.assert_array_equal(first, second)
-
-
-def test_units_of_one_kind_are_converted(tiny: Tiny) -> None:
-    from cosim.data.signals import Samples
-
-    run = simulate(
-        {"one": tiny[3]},
-        [Wire("r", "one.a", gain=2.0), Wire("r", "one.b", gain=2.0, unit="arcsec")],
-        record={"a": "one.a", "b": "one.b"},
-        step=1.0,
-        ticks=2,
-        signals={"r": Samples(180.0, "deg")},
-    )
-    np.testing.assert_allclose(run.recording["a"], 2 * np.pi)
-    np.testing.assert_allclose(run.recording["b"], 360 * np.pi / 648000)
-
-
-def test_statistics_name_inputs_that_nothing_feeds(tiny: Tiny) -> None:
-    statistics = control_loop(tiny[3], ticks=100).statistics
-    assert statistics["unconnected"] == ["plant.b"]
-    assert (statistics["steps"], statistics["rows"], statistics["notes"]) == (100, 100, [])
+        first, second = (alone(plant, [("r", "one.a")], {"y": "one.y"}, signals={"r": 1.0}) for _ in range(2))
+    np.testing.assert_array_equal(first.recording["y"], second.recording["y"])
 
 
 def test_without_the_compiled_loop_it_runs_in_python_and_says_so(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,13 +139,8 @@ def test_a_failure_names_component_tick_time_message_and_inputs(
     recording = Recording.read(path)
     assert len(recording) == 201
     assert recording.origin["complete"] is False
-
-
-@pytest.mark.parametrize("compiled", [True, False])
-def test_an_output_that_is_not_a_number_stops_the_run(tiny: Tiny, compiled: bool) -> None:
-    parameters = CONTROL | {"plant": {"nan_at": 0.2}}
     with pytest.raises(StepError, match="plant gave an output that is not a finite number at tick 200"):
-        control_loop(tiny[3], parameters=parameters, compiled=compiled)
+        control_loop(tiny[version], parameters=CONTROL | {"plant": {"nan_at": 0.2}}, compiled=compiled)
 
 
 @VERSIONS
@@ -197,14 +164,14 @@ def test_after_an_error_only_freeing_and_after_a_fatal_one_nothing_is_called(
 
 
 def test_a_recording_for_which_there_is_no_room_is_refused(tiny: Tiny, tmp_path: Path) -> None:
-    endless: dict[str, Any] = {"record": {"y": "one.y"}, "step": 1e-4, "ticks": 10**15}
+    system, endless = (tiny[3], [], {"y": "one.y"}), {"step": 1e-4, "ticks": 10**15}
     sentence = r"16 PB are needed and /.* has .*B: the recording has 1,000,000,000,000,000 rows; record fewer signals"
     with pytest.raises(OutputError, match=sentence):
-        simulate({"one": tiny[3]}, [], path=tmp_path / "run.parquet", **endless)
+        alone(*system, **endless, path=tmp_path / "run.parquet")
     with pytest.raises(OutputError, match="16 PB are needed and memory has"):
-        simulate({"one": tiny[3]}, [], **endless)
+        alone(*system, **endless)
     with pytest.raises(OutputError, match=r"2\.29 PB are needed .* the recording has 142,857,142,857,143 rows;"):
-        simulate({"one": tiny[3]}, [], decimation=7, **endless)
+        alone(*system, **endless, decimation=7)
     assert list(tmp_path.iterdir()) == []
 
 

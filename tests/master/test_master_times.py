@@ -1,24 +1,29 @@
-"""Times, counts and words of the master: which moment a component is stepped at, and what is said of a run."""
+"""Times, counts and words of the master: where a run begins and ends, which moment is stepped at, what is said."""
 
 import gc
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from oscillators import BOND, BOTH, H, Tiny, oscillator
-from simulating import simulate
+from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator
+from simulating import alone
 
 import cosim.master.execution
+from cosim.data.recording import Recording
+from cosim.data.signals import Samples
 from cosim.master.execution import chunks
 from cosim.master.loop import library
 from cosim.master.loop.shared import opened
 from cosim.master.pool import Pool
 from cosim.master.result import Statistics, _speed, remarks
+from cosim.master.simulate import Options, run
 from cosim.support.errors import StepError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
-from cosim.system.wire import Wire
+from cosim.system.scenario import parse_scenario
+from cosim.system.wire import Record, Wire
 
 HALVES = Energy(kind="energy", bonds=BOND, tolerance=1e-12, max_pieces=2)
 """So little energy may be lost that each step is taken in two pieces."""
@@ -47,32 +52,38 @@ def test_a_component_is_stepped_at_the_time_of_its_step_or_piece(
     assert caught.value.tick == tick
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "count"),
-    [(Jacobi(), 10), (GaussSeidel(kind="gauss-seidel"), 10), (HALVES, 19)],
-)
+@pytest.mark.parametrize(("algorithm", "count"), [(Jacobi(), 10), (GaussSeidel(kind="gauss-seidel"), 10), (HALVES, 19)])
 def test_each_step_that_ends_with_a_warning_counts(plain: Tiny, algorithm: Any, count: int) -> None:
     """From the middle of tick 10 on, 20 ticks in all; of the half-steps from the second of tick 10 on."""
     for compiled in (True, False):
         parameters = {"spring": {"fail_at": (10 + 0.6 * (algorithm is HALVES)) * H - 1e-9, "status": 1.0}}
-        run = oscillator(plain[2], algorithm, ticks=20, compiled=compiled, parameters=parameters)
-        assert run.statistics["warnings"] == count
+        done = oscillator(plain[2], algorithm, ticks=20, compiled=compiled, parameters=parameters)
+        assert done.statistics["warnings"] == count
 
 
 def test_pieces_of_a_run_follow_the_time_that_the_last_one_took(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tenth of a second each; at most eight times the last one, at least 16 ticks, at most half of the rest."""
     clock = iter(np.cumsum([0.0, 1e-3, 0.0, 0.09, 0.0, 1.0, 0.0, 100.0, *[0.0, 1e-7] * 20]))
     monkeypatch.setattr(cosim.master.execution, "perf_counter", lambda: float(next(clock)))
-    sizes = [len(one) for one in chunks(200_000)]
+    sizes = [len(piece) for piece in chunks(200_000)]
     assert sizes[:5] == [16, 128, 142, 16, 16]
     assert sizes[5:9] == [128, 1024, 8192, 65_536]
     assert sum(sizes) == 200_000
-    assert [len(one) for one in chunks(5)] == [5]
+    assert [len(piece) for piece in chunks(5)] == [5]
+
+
+def test_a_chunk_grows_where_steps_are_quick_ends_small_and_holds_few_columns_or_few_ticks() -> None:
+    sizes = [len(piece) for piece in chunks(1_000_000, 7)]
+    assert sum(sizes) == 1_000_000
+    assert max(sizes) == 131_072
+    assert sizes[-1] <= 32_768
+    wide = [len(piece) for piece in chunks(10_000, 1_000)]
+    assert max(wide) == 2**20 // 1_000
+    assert sum(wide) == 10_000
 
 
 def test_statistics_are_of_the_ticks_that_were_run(tiny: Tiny) -> None:
-    run = simulate({"one": tiny[3]}, [], record={"y": "one.y"}, step=2e-3, ticks=300, decimation=7)
-    told = run.statistics
+    told = alone(tiny[3], [], {"y": "one.y"}, step=2e-3, ticks=300, decimation=7).statistics
     assert (told["steps"], told["step"], told["rows"], told["ended"]) == (300, 2e-3, 43, "")
     assert told["simulated_seconds"] == pytest.approx(0.6)
     assert told["ratio_to_real_time"] == pytest.approx(0.6 / told["seconds"])
@@ -106,26 +117,20 @@ def test_what_is_said_of_a_run_beside_its_speed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "offset", "quantum"), [(2.0, 0.0, 0.0), (1.5, 4.0, 0.0), (-1.0, 7.3, 2.0), (1.0, 0.0, 5.0)]
+    ("gain", "offset", "quantum", "unit"),
+    [(2.0, 0.0, 0.0, ""), (1.5, 4.0, 0.0, ""), (-1.0, 7.3, 2.0, ""), (1.0, 0.0, 5.0, ""), (2.0, 0.3, 0.0, "arcsec")],
 )
 def test_a_wire_scales_shifts_and_rounds_in_its_own_unit_before_it_is_converted(
-    tiny: Tiny, gain: float, offset: float, quantum: float
+    tiny: Tiny, gain: float, offset: float, quantum: float, unit: str
 ) -> None:
-    """What is sent is in degrees, so are offset and quantum; what arrives is in rad."""
-    from cosim.data.signals import Samples
-
+    """What is sent is in degrees or the wire's own unit, so are offset and quantum; what arrives is in rad."""
     sent = np.linspace(-20, 20, 33)
-    run = simulate(
-        {"one": tiny[3]},
-        [Wire("r", "one.a", gain=gain, offset=offset, quantum=quantum)],
-        record={"a": "one.a"},
-        step=1.0,
-        ticks=33,
-        signals={"r": Samples(sent, "deg")},
-    )
+    wire = Wire("r", "one.a", gain=gain, offset=offset, quantum=quantum, unit=unit)
+    done = alone(tiny[3], [wire], {"a": "one.a"}, ticks=33, signals={"r": Samples(sent, "deg")})
+    size = {"": np.pi / 180, "arcsec": np.pi / 648_000}[unit]
     value = gain * sent + offset
     rounded = quantum * np.floor(value / quantum + 0.5) if quantum else value
-    np.testing.assert_allclose(run.recording["a"], np.radians(rounded), atol=1e-12)
+    np.testing.assert_allclose(done.recording["a"], size * rounded, rtol=1e-12, atol=1e-15)
 
 
 def test_a_pool_that_was_never_made_has_nothing_to_free() -> None:
@@ -135,7 +140,7 @@ def test_a_pool_that_was_never_made_has_nothing_to_free() -> None:
 
 
 @pytest.mark.parametrize("probe", [{}, {"loop_layout": lambda: 7}])
-def test_a_library_that_says_another_layout_or_none_was_built_from_another_version(
+def test_a_library_of_another_layout_or_none_was_built_from_another_version(
     probe: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = SimpleNamespace(**probe)
@@ -158,11 +163,73 @@ def test_a_column_of_exact_integers_is_zero_where_nothing_was_sent_yet() -> None
     assert math.isfinite(number)
 
 
-def test_a_chunk_grows_where_steps_are_quick_ends_small_and_holds_few_columns_or_few_ticks() -> None:
-    sizes = [len(one) for one in chunks(1_000_000, 7)]
-    assert sum(sizes) == 1_000_000
-    assert max(sizes) == 131_072
-    assert sizes[-1] <= 32_768
-    wide = [len(one) for one in chunks(10_000, 1_000)]
-    assert max(wide) == 2**20 // 1_000
-    assert sum(wide) == 10_000
+# Where a run begins and ends: its start, its last row, and components that ask to end it before its time.
+
+ENDS, EARLY, DISCARDS = 17.0, 18.0, 2.0
+
+
+@BOTH
+@VERSIONS
+def test_a_component_may_ask_to_end_the_run_and_what_was_until_then_is_whole(
+    tiny: Tiny, tmp_path: Path, version: int, compiled: bool
+) -> None:
+    parameters, path = {"one": {"status": ENDS, "fail_at": 1.0, "a": 1.0}}, tmp_path / "run.parquet"
+    given: dict[str, Any] = {"parameters": parameters, "path": path, "compiled": compiled}
+    done = alone(tiny[version], [], {"y": "one.y"}, ticks=100, **given)
+    assert done.statistics["ended"] == "one asked to end the simulation at tick 10 (1 s)"
+    assert done.statistics["ended"] + "." in done.statistics["notes"]
+    origin = Recording.read(path, required=()).origin
+    assert origin["complete"]
+    assert origin["ended"] == done.statistics["ended"]
+    np.testing.assert_allclose(done.recording["y"], np.arange(11) * 0.1, atol=1e-12)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("version", "status", "said"),
+    [
+        (2, DISCARDS, "one discarded the step at tick 10"),
+        (3, EARLY, "one returned early from its step, though early return is not allowed here, at tick 10"),
+    ],
+)
+def test_a_step_cut_short_that_ends_nothing_is_a_failure(
+    tiny: Tiny, version: int, status: float, said: str, compiled: bool
+) -> None:
+    """Early return is never allowed here, so an FMU goes through its events itself; one that does not is named."""
+    parameters = {"one": {"status": status, "fail_at": 1.0}}
+    with pytest.raises(StepError, match=said):
+        alone(tiny[version], [], {"y": "one.y"}, ticks=20, parameters=parameters, compiled=compiled)
+
+
+@BOTH
+@pytest.mark.parametrize("ticks", [8, 9])
+def test_the_last_row_is_the_sample_at_stop_where_one_falls_due(tiny: Tiny, ticks: int, compiled: bool) -> None:
+    given: dict[str, Any] = {"signals": {"r": np.arange(ticks + 1.0)}, "step": 0.5, "decimation": 2}
+    system = (tiny[3], [("r", "one.a")], {"y": "one.y", "a": "one.a", "r": "r", "mean": Record("r", "mean")})
+    plain, whole = (
+        alone(*system, ticks=ticks, last=last, compiled=compiled, **given).recording for last in (False, True)
+    )
+    rows = ticks // 2 + 1
+    assert (len(plain), len(whole)) == (-(-ticks // 2), rows)
+    np.testing.assert_array_equal(whole["r"], 2.0 * np.arange(rows))
+    np.testing.assert_array_equal(whole["a"], whole["r"])
+    np.testing.assert_array_equal(whole["y"], [0.5 * sum(range(2 * row)) for row in range(rows)])
+    np.testing.assert_array_equal(whole["mean"][: rows - 1], plain["mean"][: rows - 1])
+
+
+@BOTH
+@VERSIONS
+def test_components_and_recording_begin_at_the_start(tiny: Tiny, version: int, compiled: bool) -> None:
+    text = f"""
+    start = 5.0
+    stop = 7.0
+    step = 0.5
+    [components.one]
+    fmu = "{tiny[version]}"
+    parameters = {{ a = 1.0, status = {ENDS}, fail_at = 6.0 }}
+    [record]
+    signals = ["one.y"]
+    """
+    done = run(parse_scenario(text, "x.toml", Path()), Options(compiled=compiled))
+    np.testing.assert_array_equal(done.recording.t, [5.0, 5.5, 6.0])
+    assert done.statistics["ended"] == "one asked to end the simulation at tick 2 (6 s)"

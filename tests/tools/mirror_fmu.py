@@ -92,6 +92,18 @@ KINDS = (
     *("Enumeration", "String", "Binary"),
 )
 """In the order of their value references in FMI 3."""
+EDGES = {
+    "Int8": (-128, 127),
+    "UInt8": (0, 255),
+    "Int16": (-32_768, 32_767),
+    "UInt16": (0, 65_535),
+    "Int32": (-2_147_483_648, 2_147_483_647),
+    "UInt32": (0, 4_294_967_295),
+    "Int64": (-9_223_372_036_854_775_808, 9_223_372_036_854_775_807),
+    "UInt64": (0, 18_446_744_073_709_551_615),
+}
+"""FMI 3.0.2, 2.4.3: what each integer type holds."""
+LOOPS = pytest.mark.parametrize("compiled", [True, False])
 
 
 def named(kind: str) -> tuple[str, str]:
