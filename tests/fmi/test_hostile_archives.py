@@ -22,6 +22,14 @@ from cosim.support.errors import FmuError, ScenarioError
 from cosim.system.scenario import read_scenario
 
 
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, for this test alone."""
+    (folder := tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
 def changed(good: Path, bad: Path, *more: tuple[zipfile.ZipInfo | str, bytes]) -> Path:
     """Copy an archive and add members."""
     bad.write_bytes(good.read_bytes())
@@ -52,23 +60,16 @@ NAMES = [
 
 @pytest.mark.parametrize(("name", "sentence"), NAMES)
 @pytest.mark.parametrize("kind", ["fmu", "ssp"])
+@pytest.mark.usefixtures("read")
 def test_a_member_with_such_a_name_is_refused(
-    tiny: dict[int, Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    kind: str,
-    name: zipfile.ZipInfo | str,
-    sentence: str,
+    tiny: dict[int, Path], tmp_path: Path, temporary: Path, kind: str, name: zipfile.ZipInfo | str, sentence: str
 ) -> None:
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
     good = tiny[3] if kind == "fmu" else pack(tmp_path / "good.ssp", tiny[2], system(component("one")))
     bad = changed(good, tmp_path / f"bad.{kind}", (name, b"here"))
     with pytest.raises((FmuError, ScenarioError), match=sentence):
         FmuComponent(bad) if kind == "fmu" else read_scenario(bad)
     assert [one.name for one in tmp_path.rglob("*") if "cosim" in one.name] == []
-    assert list((tmp_path / "temporary").iterdir()) == []
+    assert list(temporary.iterdir()) == []
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(tiny: dict[int, Path], tmp_path: Path) -> None:
@@ -119,17 +120,15 @@ def test_a_member_that_cannot_be_unpacked_is_refused(
 
 
 def test_a_member_that_is_damaged_is_found_when_it_is_unpacked(
-    tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tiny: dict[int, Path], tmp_path: Path, temporary: Path
 ) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
     content = bytearray(tiny[3].read_bytes())
     content[content.index(b"\x7fELF") + 1000] ^= 1
     bad = tmp_path / "bad.fmu"
     bad.write_bytes(bytes(content))
     with pytest.raises(FmuError, match=r"tiny\.so\" cannot be unpacked: Bad CRC-32 for file"):
         FmuComponent(bad)
-    assert list((tmp_path / "temporary").iterdir()) == []
+    assert list(temporary.iterdir()) == []
 
 
 @pytest.mark.parametrize("length", [0, 10, 100, -1, -30])
@@ -150,12 +149,12 @@ def test_an_archive_that_is_cut_short_is_no_fmu(tiny: dict[int, Path], tmp_path:
         (
             'causality="output"',
             'causality="gives"',
-            'Variable "y" (line 1) has an illegal combination of causality="gives"',
+            'Variable "y" (line 1) has an illegal combination of causality',
         ),
         (
             'variability="fixed"',
             'variability="wobbly"',
-            'Variable "k" (line 1) has an illegal combination of causality="parameter" and va',
+            'Variable "k" (line 1) has an illegal combination of causality',
         ),
         ('min="0"', 'min="low"', '"k" has min = "low", which is no number'),
         ('name="b"', 'name="a"', 'the variable "a" is there twice'),
@@ -178,14 +177,20 @@ def test_event_indicators_without_number_are_refused(tiny: dict[int, Path], tmp_
         FmuComponent(described(tiny[2], tmp_path / "bad.fmu", text))
 
 
+LAUGHS = "".join(f'<!ENTITY a{n} "{f"&a{n - 1};" * 10 if n else "ha" * 10}">' for n in range(10))
+
+
 @pytest.mark.parametrize("coding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize("parts", ['<!ENTITY b SYSTEM "file:///etc/hostname">', LAUGHS], ids=["file", "bomb"])
+@pytest.mark.parametrize(("kind", "member"), [("fmu", "modelDescription.xml"), ("ssp", "SystemStructure.ssd")])
 def test_a_description_that_defines_its_own_parts_is_refused(
-    tiny: dict[int, Path], tmp_path: Path, coding: str
+    tmp_path: Path, kind: str, member: str, parts: str, coding: str
 ) -> None:
-    head = f'<?xml version="1.0" encoding="{coding}"?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]>'
-    bad = described(tiny[3], tmp_path / "bad.fmu", (head + description(3)).encode(coding))  # type: ignore[arg-type]
-    with pytest.raises(FmuError, match=r"modelDescription\.xml has a DOCTYPE"):
-        FmuComponent(bad)
+    text = f'<?xml version="1.0" encoding="{coding}"?><!DOCTYPE a [{parts}]><a>&a9;</a>'
+    with zipfile.ZipFile(tmp_path / f"bad.{kind}", "w") as archive:
+        archive.writestr(member, text.encode(coding))
+    with pytest.raises((FmuError, ScenarioError), match=f'{member}"? has a DOCTYPE'):
+        FmuComponent(tmp_path / "bad.fmu") if kind == "fmu" else read_scenario(tmp_path / "bad.ssp")
 
 
 def test_systems_that_use_each_other_without_end_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
@@ -208,19 +213,6 @@ def test_a_system_that_doubles_at_each_level_is_refused(tiny: dict[int, Path], t
         levels.append(whole.replace("<ssd:System ", f'<ssd:System id="s{level}" ', 1))
     with pytest.raises(ScenarioError, match="it has more than 10,000 elements"):
         read_scenario(pack(tmp_path / "wide.ssp", tiny[2], system("".join(levels))))
-
-
-def test_the_command_says_it_and_leaves_nothing(
-    tiny: dict[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bad = changed(tiny[3], tmp_path / "bad.fmu", ("../up", b""))
-    (tmp_path / "s.toml").write_text(
-        f'stop = 0.1\n[components.a]\nfmu = "{bad}"\n[record]\nsignals = ["a.y"]\n', "utf-8"
-    )
-    assert call("run", tmp_path / "s.toml", "--out", tmp_path / "out") == 2
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert last == (f'cosim: {bad} is no FMU that can be run: its member "../up" has a name that leads elsewhere.')
-    assert not (tmp_path / "out").exists()
 
 
 def test_what_our_own_exports_hold_is_not_refused(tiny: dict[int, Path]) -> None:

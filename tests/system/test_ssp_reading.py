@@ -7,19 +7,31 @@ import numpy as np
 import pytest
 from commands import call
 from foreign_fmu import foreign
-from ssp_files import SPACES, component, connector, pack, parameter_set, real, system, values, wire
+from ssp_files import (
+    BOOLEANS,
+    DRIVEN,
+    FOLLOWS,
+    component,
+    connector,
+    linear,
+    mapped,
+    pack,
+    parameter_set,
+    real,
+    system,
+    values,
+    wire,
+)
 
+from cosim.api.show import show
 from cosim.data.recording import Recording
 from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError
 from cosim.system.scenario import read_scenario
 
-DRIVEN = values(real("mode", 1) + real("a", 0.5))
-"""Settings that make y = 0.5 at the end of each step."""
-
 
 def test_transformations_parameters_and_the_experiment_are_those_of_the_archive(read) -> None:
-    transformed = wire("one.y", "two.a", '<ssc:LinearTransformation factor="2" offset="0.25"/>')
+    transformed = wire("one.y", "two.a", linear(factor=2, offset=0.25))
     file = '<ssd:ParameterBinding source="resources/two.ssv"/>'
     elements = component("one", DRIVEN) + component("two", file)
     scenario = read(system(elements, transformed), two_ssv=parameter_set(real("mode", 1) + real("k", 3)))
@@ -33,17 +45,15 @@ def test_transformations_parameters_and_the_experiment_are_those_of_the_archive(
 def test_nested_systems_are_flat_and_their_transformations_chain(read) -> None:
     inner = system(
         component("one"),
-        wire("in", "one.a", '<ssc:LinearTransformation factor="2"/>') + wire("one.y", "out"),
+        wire("in", "one.a", linear(factor=2)) + wire("one.y", "out"),
         name="sub",
         connectors=connector("in", "input") + connector("out", "output"),
         bindings=values(real("one.mode", 1)),
     )
+    wires = wire("drive.y", "sub.in", linear(offset=0.1)) + wire("sub.out", "last.a")
     outer = system(
-        component("drive", DRIVEN) + inner + component("last", values(real("mode", 1))),
-        wire("drive.y", "sub.in", '<ssc:LinearTransformation offset="0.1"/>')
-        + wire("sub.out", "last.a")
-        + wire("last.y", "result")
-        + wire("outside", "last.b"),
+        component("drive", DRIVEN) + inner + component("last", FOLLOWS),
+        wires + wire("last.y", "result") + wire("outside", "last.b"),
         connectors=connector("result", "output") + connector("outside", "input"),
         bindings=values(real("sub.one.k", 10)),
     )
@@ -54,12 +64,8 @@ def test_nested_systems_are_flat_and_their_transformations_chain(read) -> None:
 
 
 def test_outer_and_later_bindings_win_and_prefixes_and_mappings_rename(read) -> None:
-    scaled = '<ssc:LinearTransformation factor="2" offset="1"/>'
-    entry = f'<ssm:MappingEntry source="gain" target="k">{scaled}</ssm:MappingEntry>'
-    inline = f'<ssm:ParameterMapping {SPACES} version="1.0">{entry}</ssm:ParameterMapping>'
-    mapping = f"<ssd:ParameterMapping>{inline}</ssd:ParameterMapping>"
-    mapped = values(real("gain", 3)).replace("</ssd:ParameterValues>", "</ssd:ParameterValues>" + mapping)
-    one = component("one", values(real("k", 1)) + mapped)
+    scaled = mapped(values(real("gain", 3)), ("gain", "k"), inside=linear(factor=2, offset=1))
+    one = component("one", values(real("k", 1)) + scaled)
     two = component("two", values(real("k", 1)))
     outer = values(real("k", 4) + real("b", 5), 'prefix="two."')
     scenario = read(system(one + two, bindings=outer))
@@ -84,16 +90,14 @@ def test_units_of_parameters_are_converted(read) -> None:
     ],
 )
 def test_the_unit_of_a_connector_counts_where_its_fmu_states_none(
-    unit: str, attributes: str, factor: float, tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    unit: str, attributes: str, factor: float, read, tiny: dict[int, Path], tmp_path: Path
 ) -> None:
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
     fmu = foreign(tiny[2], tmp_path / "f.fmu", names={}, a="")
-    two = component("two", values(real("mode", 1)))
-    two = two.replace('"a" kind="input"><ssc:Real', f'"a" kind="input"><ssc:Real unit="{unit}"')
+    two = component("two", FOLLOWS).replace('"a" kind="input"><ssc:Real', f'"a" kind="input"><ssc:Real unit="{unit}"')
     inside = system(component("one", DRIVEN) + two, wire("one.y", "two.a", attributes=attributes))
     base = '<ssc:BaseUnit rad="1" factor="3.141592653589793"/>'
     inside += f'<ssd:Units><ssc:Unit name="half turns">{base}</ssc:Unit></ssd:Units>'
-    recording = run(read_scenario(pack(tmp_path / "t.ssp", fmu, inside))).recording
+    recording = run(read(inside, fmu)).recording
     np.testing.assert_allclose(recording["two.y"][2:], 0.5 * factor)
 
 
@@ -103,15 +107,12 @@ def test_a_connector_cannot_contradict_its_fmu(read) -> None:
         read(system(contrary))
 
 
-def test_the_interface_that_the_archive_asks_for_is_used(read) -> None:
-    elements = component("one", kind='implementation="CoSimulation"') + component("two", kind='implementation="any"')
-    scenario = read(system(elements + component("three", kind='implementation="ModelExchange"')))
+def test_interfaces_are_those_asked_for_and_a_connection_may_be_written_from_its_end(read) -> None:
+    asked = {"one": "CoSimulation", "two": "any", "three": "ModelExchange"}
+    elements = "".join(component(name, kind=f'implementation="{said}"') for name, said in asked.items())
+    scenario = read(system(elements, wire("two.a", "one.y")))
     assert [one.interface for one in scenario.components.values()] == ["co-simulation", "", "model-exchange"]
-
-
-def test_a_connection_written_from_its_end_is_understood(read) -> None:
-    (found,) = read(system(component("one") + component("two"), wire("two.a", "one.y"))).wires
-    assert (found.source, found.target) == ("one.y", "two.a")
+    assert [(one.source, one.target) for one in scenario.wires] == [("one.y", "two.a")]
 
 
 def test_parameters_that_no_fmu_has_and_what_is_assumed_are_told(read) -> None:
@@ -121,10 +122,8 @@ def test_parameters_that_no_fmu_has_and_what_is_assumed_are_told(read) -> None:
     assert (scenario.stop, scenario.ticks) == (1.0, 1000)
 
 
-def test_run_and_show_take_an_ssp(
-    tiny: dict[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("read")
+def test_run_and_show_take_an_ssp(tiny: dict[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = pack(tmp_path / "a b.ssp", tiny[2], system(component("one", DRIVEN + values(real("kk", 1)))))
     for command in (["show", str(path)], ["run", str(path), "--out", str(tmp_path / "out")]):
         assert call(*command) == 0
@@ -150,10 +149,6 @@ def circle() -> str:
     return system(through + component("one"), wire("sub.out", "sub.in") + wire("sub.out", "one.a"))
 
 
-TABLE = (
-    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
-    '<ssc:MapEntry source="false" target="true"/></ssc:BooleanMappingTransformation>'
-)
 WRONG = {
     'etc/passwd" lies outside the archive': alone(source="../../etc/passwd"),
     '"/etc/passwd" lies outside the archive': alone(source="/etc/passwd"),
@@ -170,9 +165,9 @@ WRONG = {
     '"one.x" is no connector; there are: a, b, y': joined(wire("one.x", "two.a")),
     '"one.a" is joined to "two.a", and a connection goes from': joined(wire("one.a", "two.a")),
     '"two.a" is fed twice, by "one.y" and by "two.y"': joined(wire("one.y", "two.a"), wire("two.y", "two.a")),
-    'the Boolean mapping of "two.a" holds "yes"': joined(wire("one.y", "two.a", TABLE.replace("true", "yes"))),
-    'the Boolean mapping of "two.a" names "0" twice': joined(wire("one.y", "two.a", TABLE.replace("true", "0", 1))),
-    'factor = "2,5" is no finite': joined(wire("one.y", "two.a", '<ssc:LinearTransformation factor="2,5"/>')),
+    'the Boolean mapping of "two.a" holds "yes"': joined(wire("one.y", "two.a", BOOLEANS.replace("true", "yes"))),
+    'the Boolean mapping of "two.a" names "0" twice': joined(wire("one.y", "two.a", BOOLEANS.replace("true", "0", 1))),
+    'factor = "2,5" is no finite': joined(wire("one.y", "two.a", linear(factor="2,5"))),
     'the parameter "k" = "much" is no Real': alone(values(real("k", "much"))),
     '"s.ssv" is missing': alone('<ssd:ParameterBinding source="s.ssv"/>'),
     '"s.ssv" lies inside a component': alone('<ssd:ParameterBinding source="s.ssv" sourceBase="component"/>'),
@@ -203,8 +198,8 @@ def test_other_versions_are_refused_and_a_late_start_is_kept(read) -> None:
             read(system(TWO), experiment=f"<ssd:DefaultExperiment {times}/>")
 
 
-def test_damaged_archives_are_refused(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("read")
+def test_damaged_archives_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
     path = tmp_path / "t.ssp"
     with pytest.raises(ScenarioError, match="does not exist"):
         read_scenario(path)
@@ -228,18 +223,93 @@ def test_damaged_archives_are_refused(tiny: dict[int, Path], tmp_path: Path, mon
     assert not (tmp_path / "cache").exists() or not list((tmp_path / "cache").rglob("*.partial"))
 
 
-def test_members_that_would_escape_are_refused(read, tiny: dict[int, Path], tmp_path: Path) -> None:
-    path = pack(tmp_path / "u.ssp", tiny[2], system(component("one")))
+# An archive with several systems lets one be chosen; bindings and mappings that reach nothing are named.
+
+
+@pytest.fixture
+def two(read, tiny: dict[int, Path], tmp_path: Path) -> Path:
+    """An archive with a second system, called "fast", in Fast.ssd."""
+    path = pack(tmp_path / "two.ssp", tiny[2], system(component("one", DRIVEN)))
+    other = values(real("mode", 1) + real("a", 2.0))
     with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("../escaped.txt", "out")
-    with pytest.raises(ScenarioError, match=r'"\.\./escaped\.txt" has a name that leads elsewhere'):
-        read_scenario(path)
-    assert not [one for one in tmp_path.rglob("*") if one.name == "escaped.txt"]
+        text = archive.read("SystemStructure.ssd").decode().replace(DRIVEN, other).replace('name="t"', 'name="fast"')
+        archive.writestr("Fast.ssd", text)
+        archive.writestr("resources/Inner.ssd", text)
+    return path
 
 
-def test_entities_that_explode_are_refused(read, tiny: dict[int, Path], tmp_path: Path) -> None:
-    laughs = "".join(f'<!ENTITY a{n} "{f"&a{n - 1};" * 10 if n else "ha" * 10}">' for n in range(10))
-    with zipfile.ZipFile(tmp_path / "l.ssp", "w") as archive:
-        archive.writestr("SystemStructure.ssd", f"<!DOCTYPE a [{laughs}]><a>&a9;</a>")
-    with pytest.raises(ScenarioError, match=r'"SystemStructure\.ssd" has a DOCTYPE'):
-        read_scenario(tmp_path / "l.ssp")
+def last(source: object) -> float:
+    return float(run(read_scenario(str(source))).recording["one.y"][-1])
+
+
+def test_another_system_of_an_archive_is_chosen_by_its_file_or_its_name(two: Path) -> None:
+    assert [last(two), last(f"{two}#Fast.ssd"), last(f"{two}#fast")] == [0.5, 2.0, 2.0]
+    said = (
+        "It holds more than one system, of which SystemStructure.ssd is run; the others are: two.ssp#Fast.ssd (fast)."
+    )
+    assert said in read_scenario(two).notes
+    assert said in show(two).facts.values()
+    assert said in run(read_scenario(two)).statistics["notes"]
+    assert not any("more than one" in note for note in read_scenario(f"{two}#Fast.ssd").notes)
+    assert show(f"{two}#fast").facts["scenario"] == "fast"
+
+
+def test_a_system_that_an_archive_does_not_have_is_named_with_those_it_has(two: Path) -> None:
+    with pytest.raises(ScenarioError, match=r'it has no SSD "Slow\.ssd"; there are: Fast\.ssd, System'):
+        read_scenario(f"{two}#Slow.ssd")
+
+
+def test_in_a_folder_any_ssd_is_the_system(two: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(two) as archive:
+        archive.extractall(tmp_path / "folder")
+    assert [last(tmp_path / "folder" / name) for name in ("SystemStructure.ssd", "Fast.ssd")] == [0.5, 2.0]
+
+
+def test_an_ssd_that_cannot_be_read_and_is_not_run_stops_nothing(two: Path) -> None:
+    with zipfile.ZipFile(two, "a") as archive:
+        archive.writestr("Broken.ssd", "<broken")
+    assert last(two) == 0.5
+    assert any("two.ssp#Broken.ssd (unreadable)" in note for note in read_scenario(two).notes)
+
+
+GAINS = values(real("gain", 3.0) + real("offset", 1.0))
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        (
+            system(component("one", mapped(GAINS, ("gian", "k"), ("offset", "a")))),
+            '"k" is not set: its mapping names "gian", and the set holds gain, offset.',
+        ),
+        (
+            system(component("one"), bindings=values(real("one.k", 2.0) + real("onne.k", 2.0) + real("k", 1.0))),
+            "Not set, because no element has these names: onne.k, k.",
+        ),
+        (
+            system(component("one"), bindings=values(real("k", 2.0), 'prefix="two."')),
+            "Not set, because no element has these names: two.k.",
+        ),
+        (
+            system(
+                system(component("one"), name="sub"), bindings=values(real("sub.one.kk", 2.0) + real("sub.two.k", 1))
+            ),
+            "Not set, because no element has these names: sub.two.k.",
+        ),
+    ],
+)
+def test_what_is_bound_to_nothing_is_noted(inside: str, said: str, read) -> None:
+    scenario = read(inside)
+    assert said in scenario.notes
+    assert said in run(scenario).statistics["notes"]
+
+
+def test_two_sources_of_one_target_are_refused(read) -> None:
+    with pytest.raises(ScenarioError, match='a parameter mapping has two sources of "k", "gain" and "offset"'):
+        read(system(component("one", mapped(GAINS, ("gain", "k"), ("offset", "k")))))
+
+
+def test_start_values_travel_through_an_archive(read) -> None:
+    """A wire of an SSP brings its value at the start, as one of a scenario does."""
+    at_once = component("one", values(real("mode", 2) + real("a", 0.5))) + component("two", values(real("mode", 2)))
+    assert run(read(system(at_once, wire("one.y", "two.a")))).recording["two.y"][0] == 0.5

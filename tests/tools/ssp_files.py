@@ -53,6 +53,30 @@ def real(name: str, value: object, unit: str = "") -> str:
     return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}" {unit}/></ssv:Parameter>'
 
 
+DRIVEN = values(real("mode", 1) + real("a", 0.5))
+"""Settings that make y = 0.5 at the end of each step."""
+FOLLOWS = values(real("mode", 1))
+"""Settings that make y = a at the end of each step."""
+BOOLEANS = (
+    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+    '<ssc:MapEntry source="false" target="true"/></ssc:BooleanMappingTransformation>'
+)
+
+
+def linear(**numbers: float | str) -> str:
+    told = " ".join(f'{name}="{number}"' for name, number in numbers.items())
+    return f"<ssc:LinearTransformation {told}/>"
+
+
+def mapped(binding: str, *pairs: tuple[str, str], inside: str = "") -> str:
+    """The binding with a mapping of sources to targets, which transform what is inside."""
+    tag = "ssm:MappingEntry"
+    entries = "".join(f'<{tag} source="{source}" target="{target}">{inside}</{tag}>' for source, target in pairs)
+    inline = f'<ssm:ParameterMapping {SPACES} version="1.0">{entries}</ssm:ParameterMapping>'
+    mapping = f"<ssd:ParameterMapping>{inline}</ssd:ParameterMapping></ssd:ParameterBinding>"
+    return binding.replace("</ssd:ParameterBinding>", mapping)
+
+
 def wire(start: str, end: str, inside: str = "", attributes: str = "") -> str:
     """A connection; an end without a dot is a connector of the system itself."""
     said = attributes
@@ -89,6 +113,6 @@ def pack(
 
 @pytest.fixture
 def read(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Scenario]:
-    """Pack an archive and read it, with a cache of its own."""
+    """Pack an archive around the tiny FMU or another and read it, with a cache of its own."""
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
-    return lambda inside, **more: read_scenario(pack(tmp_path / "t.ssp", tiny[2], inside, **more))
+    return lambda inside, fmu=tiny[2], **more: read_scenario(pack(tmp_path / "t.ssp", fmu, inside, **more))
