@@ -19,11 +19,7 @@ def test_what_is_no_folder_in_the_place_of_one_is_told_before_the_work(tmp_path:
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ["serve", "--port", "99999"],
-        ["identify", "run.csv", "--card", "emps", "--out", "x", "--cut", "-1"],
-    ],
+    "words", [["serve", "--port", "99999"], ["identify", "run.csv", "--card", "emps", "--out", "x", "--cut", "-1"]]
 )
 def test_numbers_out_of_range_are_refused_with_their_range(
     words: list[str], capsys: pytest.CaptureFixture[str]

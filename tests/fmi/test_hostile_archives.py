@@ -109,8 +109,7 @@ def spoiled(good: Path, bad: Path, field: int, value: int, kind: bytes = b"PK\x0
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "sentence"),
-    [(8, 1, "has a password"), (10, 99, r"is packed in a way that is not known \(99\)")],
+    ("field", "value", "sentence"), [(8, 1, "has a password"), (10, 99, r"is packed in a way that is not known \(99\)")]
 )
 def test_a_member_that_cannot_be_unpacked_is_refused(
     tiny: dict[int, Path], tmp_path: Path, field: int, value: int, sentence: str
@@ -146,11 +145,7 @@ def test_an_archive_that_is_cut_short_is_no_fmu(tiny: dict[int, Path], tmp_path:
         ('valueReference="1"', 'valueReference="4294967296"', '"b" has the value reference 4294967296; a value refe'),
         ('valueReference="1"', 'valueReference="-1"', '"b" has the value reference -1; a value reference is a whole'),
         ('valueReference="1"', 'valueReference="1e3"', "cannot be read: invalid literal for int"),
-        (
-            'causality="output"',
-            'causality="gives"',
-            'Variable "y" (line 1) has an illegal combination of causality',
-        ),
+        ('causality="output"', 'causality="gives"', 'Variable "y" (line 1) has an illegal combination of causality'),
         (
             'variability="fixed"',
             'variability="wobbly"',

@@ -74,8 +74,7 @@ def test_each_algorithm_is_the_method_it_says(tiny: Tiny, case: str, version: in
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "order"),
-    [(Jacobi(), 1), (Iterated(kind="iterated", theta=1.0), 1), (Iterated(kind="iterated"), 2)],
+    ("algorithm", "order"), [(Jacobi(), 1), (Iterated(kind="iterated", theta=1.0), 1), (Iterated(kind="iterated"), 2)]
 )
 def test_the_error_falls_with_the_order_of_the_method(tiny: Tiny, algorithm: Any, order: int) -> None:
     errors = []

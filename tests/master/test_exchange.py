@@ -17,11 +17,7 @@ from cosim.support.errors import FmuError, StepError
 from cosim.system.scenario import parse_scenario
 from pyfmi_models.export import export_fmu
 
-WIRES = [
-    ("controller.command", "plant.drive"),
-    ("plant.reading", "controller.measured"),
-    ("r", "controller.wanted"),
-]
+WIRES = [("controller.command", "plant.drive"), ("plant.reading", "controller.measured"), ("r", "controller.wanted")]
 VERSIONS = pytest.mark.parametrize("fmi", [2, 3])
 
 

@@ -115,10 +115,7 @@ def test_a_local_variable_of_fmi_2_is_read_when_its_component_is_initialised(mak
 @VERSIONS
 def test_an_output_is_read_after_the_inputs_that_it_follows(make: Make, version: int) -> None:
     """Each input is set once, though the two components wait for each other."""
-    fmus = {
-        "once": make("once", version, follows="u"),
-        "source": make("source", version, follows="", variables=GIVES),
-    }
+    fmus = {"once": make("once", version, follows="u"), "source": make("source", version, follows="", variables=GIVES)}
     wires = [("source.y", "once.u"), ("once.y", "source.any")]
     run = started(fmus, wires, {"y": "once.y"}, parameters={"source": {"c": 7.0}})
     assert first(run, "y") == 7.0

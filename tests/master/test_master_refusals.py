@@ -145,10 +145,7 @@ def test_a_start_value_that_a_description_leaves_out_can_be_given(make: Make, ve
     ("variable", "said"),
     [
         (V("z", 4), '"one.z" is calculated by the FMU and cannot be set; what can be set: u, k, c.'),
-        (
-            V("z", 4, variability="constant", initial="exact", start="1"),
-            '"one.z" is a constant and cannot be set',
-        ),
+        (V("z", 4, variability="constant", initial="exact", start="1"), '"one.z" is a constant and cannot be set'),
         (V("z", 4, "independent"), '"one.z" is the time and cannot be set; what can be set: u, k, c.'),
     ],
 )

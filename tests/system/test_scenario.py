@@ -150,12 +150,7 @@ def test_what_a_scenario_does_not_say_of_its_algorithm_stays_as_it_is() -> None:
 
 @pytest.mark.parametrize(
     ("text", "owner", "port"),
-    [
-        ("plant.q", "plant", "q"),
-        ("plant.bristle.z[1]", "plant", "bristle.z[1]"),
-        ("n", "n", ""),
-        ("a.", "a", ""),
-    ],
+    [("plant.q", "plant", "q"), ("plant.bristle.z[1]", "plant", "bristle.z[1]"), ("n", "n", ""), ("a.", "a", "")],
 )
 def test_a_reference_is_its_text_and_its_two_parts(text: str, owner: str, port: str) -> None:
     found = PortRef(text)
