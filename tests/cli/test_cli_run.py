@@ -12,30 +12,26 @@ from commands import ENVIRONMENT, cache, call
 import cosim.models.cache
 from cosim.cli import main
 from cosim.data.recording import Recording
+from cosim.support.errors import ScenarioError
 
 __all__ = ["cache"]
 
 
-def test_run_writes_a_recording_and_prints_its_path(
+def test_run_writes_a_recording_and_prints_its_path_or_as_json_what_it_also_writes(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    out = tmp_path / "out"
+    assert call("run", scenario, "--out", out) == 0
     said = capsys.readouterr()
-    assert said.out == f"{tmp_path / 'out' / 'recording.parquet'}\n"
+    assert said.out == f"{out / 'recording.parquet'}\n"
     assert "loop: 500 steps of 0.001 s\nRMS tracking error " in said.err
     assert "\n500 steps in " in said.err
     assert "not connected, at their start values: plant.b" in said.err
-    assert len(Recording.read(tmp_path / "out" / "recording.parquet")) == 250
-
-
-def test_run_as_json_prints_what_it_also_writes(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert call("run", scenario, "--out", tmp_path / "out", "--json") == 0
+    assert len(Recording.read(out / "recording.parquet")) == 250
+    assert call("run", scenario, "--out", out, "--force", "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told == json.loads((tmp_path / "out" / "run.json").read_text())
-    assert told["steps"] == 500
-    assert told["recording"] == str(tmp_path / "out" / "recording.parquet")
+    assert told == json.loads((out / "run.json").read_text())
+    assert (told["steps"], told["recording"]) == (500, str(out / "recording.parquet"))
     np.testing.assert_allclose(told["ratio_to_real_time"], 0.5 / told["seconds"])
 
 
@@ -58,11 +54,6 @@ def test_a_mistake_is_one_sentence_and_exit_code_2(tmp_path: Path, capsys: pytes
     assert said.err.count("\n") == 1
     assert said.out == ""
     assert not (tmp_path / "out").exists()
-
-
-def test_debug_shows_where_it_came_from(tmp_path: Path) -> None:
-    from cosim.support.errors import ScenarioError
-
     with pytest.raises(ScenarioError):
         main(["run", "none.toml", "--out", str(tmp_path), "--debug"])
 
@@ -75,9 +66,7 @@ def test_a_failing_component_leaves_what_was_recorded(
     path = tmp_path / "out" / "recording.parquet"
     note, sentence = capsys.readouterr().err.splitlines()[-2:]
     assert note == f"what was recorded until then is in {path}"
-    assert sentence.startswith(
-        'cosim: controller returned an error at tick 300 (0.3 s); it said "the shaft broke"; its last'
-    )
+    assert sentence.startswith('cosim: controller returned an error at tick 300 (0.3 s); it said "the shaft broke"; ')
     assert len(Recording.read(path)) == 151
 
 
@@ -150,16 +139,8 @@ def test_export_writes_plant_and_controller_for_both_versions(
 @pytest.mark.parametrize(
     ("what", "words"),
     [
-        (
-            "sidereal",
-            [
-                "scenario: sidereal",
-                "─ tau ───────────▶ mount.tau       1 tick, 0.1 ms",
-                "15 s (150,000 steps)",
-                "rows: every step",
-                "→ mount: 2 ticks, 0.2 ms",
-            ],
-        ),
+        ("sidereal", ["scenario: sidereal", "15 s (150,000 steps)", "rows: every step", "→ mount: 2 ticks, 0.2 ms"]),
+        ("sidereal", ["─ tau ───────────▶ mount.tau       1 tick, 0.1 ms"]),
         ("paper_mount", ["card: paper_mount", "friction.sigma0", "kg.m2", "controller: C2a"]),
         ("loop.toml", ["scenario: loop", "x 2; quantum 1e-06; + n", "r.position"]),
         ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     Float64  rad"]),
@@ -167,15 +148,10 @@ def test_export_writes_plant_and_controller_for_both_versions(
     ],
 )
 def test_show_tells_what_a_file_is(
-    scenario: Path,
-    tiny: dict[int, Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    what: str,
-    words: list[str],
+    scenario: Path, tiny: dict[int, Path], capsys: pytest.CaptureFixture[str], what: str, words: list[str]
 ) -> None:
-    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write(tmp_path / "run.csv")
-    files = {"loop.toml": scenario, "tiny3.fmu": tiny[3], "run.csv": tmp_path / "run.csv"}
+    files = {"loop.toml": scenario, "tiny3.fmu": tiny[3], "run.csv": scenario.with_name("run.csv")}
+    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write(files["run.csv"])
     assert call("show", files.get(what, what)) == 0
     shown = capsys.readouterr().out
     assert [word for word in words if word not in shown] == []

@@ -18,9 +18,7 @@ def waves(t: np.ndarray) -> np.ndarray:
     return np.sin(1.3 * t) + 0.4 * np.sin(3.1 * t + 1)
 
 
-def table(
-    rate: float, seconds: float = 20.0, start: float = 0.0, moved: float = 0.0, extra: float = 0.0
-) -> pd.DataFrame:
+def table(rate: float, seconds: float = 20.0, start: float = 0.0, moved: float = 0.0, extra: float = 0.0) -> Any:
     """A motion sampled at a rate from a start on; `moved` is what its clock is behind, `extra` a torque on top."""
     t = start + np.arange(round(seconds * rate)) / rate
     return pd.DataFrame({"t": t - moved, "q": waves(t), "tau": 2 * np.cos(t) + extra})
@@ -30,12 +28,12 @@ def test_other_rates_and_spans_are_compared_on_the_rows_of_the_first() -> None:
     found = cosim.compare(table(500.0), table(200.0, 15.0, 2.0, extra=0.25))
     assert (found.overlay.t[0], found.overlay.t[-1]) == pytest.approx((2.0, 16.994), abs=0.01)
     by_column = {one.column: one for one in found.differences}
-    assert by_column["tau"].rms == pytest.approx(0.25, rel=1e-3)
-    assert by_column["tau"].largest == pytest.approx(0.25, rel=1e-3)
+    assert (by_column["tau"].rms, by_column["tau"].largest) == pytest.approx((0.25, 0.25), rel=1e-3)
     assert by_column["q"].rms < 1e-4
     assert not found.notes
-    assert found.as_json()["span"] == pytest.approx([2.0, 16.994], abs=1e-9)
-    assert found.as_json()["rows"] == 7498
+    told = found.as_json()
+    assert told["span"] == pytest.approx([2.0, 16.994], abs=1e-9)
+    assert told["rows"] == 7498
 
 
 def test_another_clock_is_moved_by_what_the_motion_says_and_it_is_said() -> None:
@@ -82,18 +80,11 @@ def test_the_command_writes_a_page_that_needs_no_network_a_figure_and_numbers(
         cosim.compare(tmp_path / "a.csv", tmp_path / "b.csv", out=out)
 
 
-@pytest.mark.parametrize(
-    ("others", "error", "sentence"),
-    [
-        ((), InputError, "A comparison needs two recordings or more"),
-        ((pd.DataFrame({"t": np.arange(200) / 10, "x": np.arange(200.0)}),), RecordingError, "no column in common"),
-    ],
-)
-def test_what_cannot_be_compared_is_one_sentence(
-    others: tuple[pd.DataFrame, ...], error: type[Exception], sentence: str
-) -> None:
-    with pytest.raises(error, match=sentence):
-        cosim.compare(table(100.0), *others)
+def test_what_cannot_be_compared_is_one_sentence() -> None:
+    with pytest.raises(InputError, match="A comparison needs two recordings or more"):
+        cosim.compare(table(100.0))
+    with pytest.raises(RecordingError, match="no column in common"):
+        cosim.compare(table(100.0), pd.DataFrame({"t": np.arange(200) / 10, "x": np.arange(200.0)}))
 
 
 # The page of a comparison: by axe, on a phone, in the dark.

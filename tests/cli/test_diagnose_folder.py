@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from mortal import mortal
-from test_cli_run import ENVIRONMENT, call
+from commands import ENVIRONMENT, call
+from mortal import marked, mortal
 
 import cosim
 from cosim.api.machine_work import Options, Order
@@ -65,12 +65,8 @@ def test_what_was_done_before_a_kill_is_not_done_again_also_without_a_folder_tha
 ) -> None:
     monkeypatch.setenv("COSIM_OUT", "")
     words, out = ["diagnose", "all", "--quick", "--json", "--workers", "1"], fleet / "cosim_out" / "all-1"
-    process = subprocess.Popen(
-        mortal(sys.executable, "-m", "cosim", *words),
-        env=ENVIRONMENT | {"COSIM_OUT": ""},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    )
+    command, given = mortal(sys.executable, "-m", "cosim", *words), ENVIRONMENT | {"COSIM_OUT": ""}
+    process = subprocess.Popen(command, env=given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     assert process.stdout is not None
     first = json.loads(process.stdout.readline())["machine"]
     process.send_signal(signal.SIGKILL)
@@ -98,27 +94,15 @@ def test_no_process_outlives_a_kill(fleet: Path) -> None:
     assert process.stderr is not None
     process.stderr.readline()
     end = time.monotonic() + 30
-    while len(marked(str(fleet))) < 2:
+    while len(marked(f"COSIM_MARK={fleet}")) < 2:
         assert time.monotonic() < end
         time.sleep(0.05)
     process.kill()
     process.wait()
     process.stderr.close()
-    while marked(str(fleet)):
+    while marked(f"COSIM_MARK={fleet}"):
         assert time.monotonic() < end, "a process of a machine outlives the kill"
         time.sleep(0.1)
-
-
-def marked(mark: str) -> list[int]:
-    """Processes that were started with a mark in their environment."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        try:
-            if f"COSIM_MARK={mark}".encode() in path.read_bytes():
-                found.append(int(path.parent.name))
-        except OSError:
-            continue
-    return found
 
 
 def test_the_key_of_an_answer_changes_with_files_card_and_options(fleet: Path) -> None:
@@ -150,11 +134,9 @@ def test_a_cluster_gives_the_same_answers(fleet: Path, monkeypatch: pytest.Monke
     assert there.errors == here.errors
     assert "all/south_2.csv" in there.errors["south"]
     for name in there.missing:
-        files = [sorted(path.name for path in (fleet / where / name).iterdir()) for where in ("here", "there")]
-        assert files[0] == files[1]
-        held = [
-            json.loads((fleet / where / name / "diagnosis.json").read_text())["heldout"] for where in ("here", "there")
-        ]
+        one, other = (fleet / where / name for where in ("here", "there"))
+        assert sorted(path.name for path in one.iterdir()) == sorted(path.name for path in other.iterdir())
+        held = [json.loads((folder / "diagnosis.json").read_text())["heldout"] for folder in (one, other)]
         assert held[0] == held[1]
 
 

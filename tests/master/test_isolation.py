@@ -10,12 +10,12 @@ import sys
 import tempfile
 import time
 import zipfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from commands import ENVIRONMENT, call
+from mortal import marked
 
 from cosim.data.recording import Recording
 from cosim.master.isolated import run_isolated
@@ -99,16 +99,6 @@ def test_what_an_fmu_started_ends_with_it(scenario: Path, tmp_path: Path) -> Non
     done = subprocess.run(command_of(scenario, tmp_path / "out"), env=given, capture_output=True, check=False)
     assert b"ended its process with exit code 3" in done.stderr
     assert marked(tmp_path) == []
-
-
-def marked(mark: Path) -> list[str]:
-    """Other processes in whose environment a path is."""
-    found = []
-    for one in Path("/proc").glob("[0-9]*/environ"):
-        with suppress(OSError):
-            if one.parent.name != str(os.getpid()) and os.fsencode(mark) in one.read_bytes():
-                found.append(one.parent.name)
-    return found
 
 
 @linux

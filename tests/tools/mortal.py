@@ -2,6 +2,8 @@
 
 import os
 import sys
+from contextlib import suppress
+from pathlib import Path
 
 DIES = """
 import ctypes, os, sys
@@ -17,3 +19,13 @@ def mortal(*command: str) -> list[str]:
     if sys.platform != "linux":
         return list(command)
     return [sys.executable, "-c", DIES, str(os.getpid()), *command]
+
+
+def marked(mark: str | Path) -> list[str]:
+    """Other processes in whose environment a text is, as their numbers."""
+    found = []
+    for one in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):
+            if one.parent.name != str(os.getpid()) and os.fsencode(mark) in one.read_bytes():
+                found.append(one.parent.name)
+    return found
