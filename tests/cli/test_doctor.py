@@ -33,10 +33,7 @@ def test_versions_abilities_extras_and_caches_are_listed(
     assert "fmus" in said
 
 
-def test_what_is_missing_comes_with_the_command_that_installs_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path))
+def test_what_is_missing_comes_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     there = looked._version_of
     gone = {"asammdf", "ziglang", "casadi"}
     monkeypatch.setattr(looked, "_version_of", lambda name: "" if name in gone else there(name))
@@ -56,6 +53,13 @@ try:
 finally:
     print(*(one for one in {heavy} if one in sys.modules), file=sys.stderr)
 """
+
+
+def loading(arguments: list[str], heavy: tuple[str, ...]) -> "subprocess.CompletedProcess[str]":
+    code = CODE.format(arguments=arguments, heavy=heavy)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
 CARD = str(files("pyfmi_models") / "cards" / "paper_mount.toml")
 
 
@@ -68,15 +72,13 @@ CARD = str(files("pyfmi_models") / "cards" / "paper_mount.toml")
     ],
 )
 def test_nothing_heavy_is_loaded(arguments: list[str], heavy: tuple[str, ...]) -> None:
-    code = CODE.format(arguments=arguments, heavy=heavy)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = loading(arguments, heavy)
     assert done.stdout
     assert done.stderr.strip() == ""
 
 
 def test_a_run_with_its_page_loads_nothing_that_reads_recordings_fits_or_draws(tmp_path: Path) -> None:
     heavy = ("cosim.data.formats", "pyarrow.compute", "pandas", "scipy", "casadi", "ziglang", "matplotlib")
-    code = CODE.format(arguments=["run", "sidereal", "--stop", "0.05", "--out", str(tmp_path)], heavy=heavy)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = loading(["run", "sidereal", "--stop", "0.05", "--out", str(tmp_path)], heavy)
     assert (tmp_path / "run.html").is_file(), done.stderr
     assert done.stderr.splitlines()[-1] == ""

@@ -7,12 +7,15 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from commands import call
-from simulating import simulate
+from simulating import alone
 from small_loop import TEXT
 
+import cosim
 from cosim.data.signals import Samples, Slews, Stream
 from cosim.hardware.machine import parse_machine
-from cosim.support.errors import HardwareError, ScenarioError, SignalError, SweepError
+from cosim.master.simulate import run
+from cosim.support.errors import HardwareError, InputError, OutputError, ScenarioError, SignalError, SweepError
+from cosim.support.files import check_free
 from cosim.support.numbers import shown
 from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import parse_scenario
@@ -20,6 +23,9 @@ from pyfmi_models.card import parse_card
 from pyfmi_models.errors import CardError
 
 DIGITS, NESTED = "1" + "0" * 5000, "[" * 2000 + "]" * 2000
+SINE = 'kind = "sine"\nfrequency = 2.0\namplitude = 0.1'
+SLEWS = 'kind = "slews"\nmax_velocity = 1.0\nmax_acceleration = 1.0'
+ITERATED = '[algorithm]\nkind = "iterated"'
 FAULT = '[[faults]]\non = "plant.a"\nkind = "offset"\nvalue = 1.0\n'
 CARD = (Path(__file__).parents[2] / "pyfmi_models" / "cards" / "paper_mount.toml").read_text("utf-8")
 
@@ -39,16 +45,8 @@ CARD = (Path(__file__).parents[2] / "pyfmi_models" / "cards" / "paper_mount.toml
         ("decimation = 2", f"decimation = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
         ("[record]", f"{FAULT}from = 1e308\n[record]", r"from = 1e\+308 breaks a rule: input should be less"),
         ("[record]", f"{FAULT}from = 0.1\nuntil = 1e308\n[record]", r"until = 1e\+308 breaks a rule: input should be"),
-        (
-            'kind = "sine"\nfrequency = 2.0\namplitude = 0.1',
-            'kind = "slews"\npositions = [0.0, 1e300]\nmax_velocity = 1.0\nmax_acceleration = 1.0\nmax_jerk = 1.0',
-            r"a move would take more than 1e\+12 s",
-        ),
-        (
-            "[signals.r]",
-            '[algorithm]\nkind = "iterated"\nmax_iterations = 10000000\n[signals.r]',
-            r"max_iterations = 10",
-        ),
+        (SINE, f"{SLEWS}\npositions = [0.0, 1e300]\nmax_jerk = 1.0", r"a move would take more than 1e\+12 s"),
+        ("[signals.r]", f"{ITERATED}\nmax_iterations = 10000000\n[signals.r]", r"max_iterations = 10"),
     ],
 )
 def test_a_scenario_with_such_a_number_is_refused(old: str, new: str, sentence: str) -> None:
@@ -69,7 +67,7 @@ def test_a_scenario_with_such_a_number_is_refused(old: str, new: str, sentence: 
 def test_a_frequency_that_the_ticks_cannot_show_is_refused(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, named: str
 ) -> None:
-    scenario.write_text(scenario.read_text().replace('kind = "sine"\nfrequency = 2.0\namplitude = 0.1', kind))
+    scenario.write_text(scenario.read_text().replace(SINE, kind))
     assert call("run", scenario, "--out", tmp_path / "out") == 2
     sentence = f'The signal "r" has {named} Hz; at a step of 0.001 s it must stay below 500 Hz.'
     assert sentence in capsys.readouterr().err
@@ -78,8 +76,6 @@ def test_a_frequency_that_the_ticks_cannot_show_is_refused(
 
 def test_a_frequency_just_below_half_of_the_ticks_is_run(tiny: dict[int, Path]) -> None:
     text = TEXT.replace("frequency = 2.0", "frequency = 499.0").replace('"tiny', f'"{tiny[2].parent}/tiny')
-    from cosim.master.simulate import run
-
     assert run(parse_scenario(text, "loop.toml", Path())).statistics["steps"] == 500
 
 
@@ -124,9 +120,8 @@ NOT_FINITE = r'The signal "r\.value" is {} at tick 33 \(0\.033 s\); it must be a
     ],
 )
 def test_a_signal_that_is_no_number_is_named_with_its_time(tiny: dict[int, Path], signal: Any, sentence: str) -> None:
-    wires, signals = [("r.value", "plant.a")], {"r": signal}
     with pytest.raises(SignalError, match=sentence):
-        simulate({"plant": tiny[3]}, wires, record={"y": "plant.y"}, step=1e-3, ticks=40, signals=signals)
+        alone(tiny[3], [("r.value", "one.a")], {"y": "one.y"}, step=1e-3, ticks=40, signals={"r": signal})
 
 
 @pytest.mark.parametrize("limit", [1e150, 1e200, 1e308])
@@ -168,12 +163,9 @@ def test_a_card_with_such_a_number_is_refused(old: str, new: str, sentence: str)
     ],
 )
 def test_a_sweep_with_such_a_number_is_refused(tmp_path: Path, line: str, sentence: str) -> None:
-    varied = line if line.startswith('"') else '"a.b" = [1.0]'
-    head = "" if line.startswith('"') else f"{line}\n"
-    path = tmp_path / "sweep.toml"
-    path.write_text(
-        f'scenario = "sidereal"\n{head}[vary]\n{varied}\n[statistics]\nend = {{ signal = "q", kind = "final" }}'
-    )
+    head, varied = ("", line) if line.startswith('"') else (f"{line}\n", '"a.b" = [1.0]')
+    rest = '[statistics]\nend = { signal = "q", kind = "final" }'
+    (path := tmp_path / "sweep.toml").write_text(f'scenario = "sidereal"\n{head}[vary]\n{varied}\n{rest}')
     with pytest.raises(SweepError, match=sentence):
         read_sweep(path)
 
@@ -208,3 +200,46 @@ def test_a_long_value_is_cut_short_in_a_message() -> None:
     assert shown(3.5) == "3.5"
     assert shown("x" * 100) == f"'{'x' * 59}... (102 characters)"
     assert shown(10**5000) == "a int"
+
+
+# What cannot end well is refused before any work is done.
+
+
+def test_what_is_no_folder_in_the_place_of_one_is_told_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file", "utf-8")
+    with pytest.raises(OutputError, match=r"The directory .*taken cannot be made: .*taken is a file\."):
+        check_free(tmp_path / "taken" / "card.toml", force=True)
+    with pytest.raises(OutputError, match=r"The directory /dev/null/paper cannot be made: /dev/null is no folder\."):
+        check_free(Path("/dev/null/paper/README.md"), force=True)
+
+
+IDENTIFY = "identify a.csv --card emps --out out"
+OF_AN_FMU = ["--cluster host:1", "--window 3", "--heldout b.csv", "--set a=1", "--workers 2"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("serve --port 99999", "--port"),
+        (f"{IDENTIFY} --cut -1", "--cut"),
+        *(
+            (f"{IDENTIFY} {option}", f"{option.split()[0]} goes with an FMU or a system alone; ")
+            for option in OF_AN_FMU
+        ),
+        ("identify a.csv --fmu theirs.fmu --free k --cut 2", "--cut goes with a card alone; leave it out."),
+    ],
+)
+def test_an_option_out_of_its_range_or_of_another_kind_of_model_is_refused_not_passed_over(
+    words: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call(*words.split()) == 2
+    assert sentence in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_so_is_an_argument_of_the_call() -> None:
+    with pytest.raises(InputError, match="cluster: of an FMU or a system, not of a card"):
+        cosim.identify("a.csv", "card.toml", cluster="tcp://host:8786")  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match="'clutser'"):
+        cosim.identify("a.csv", "card.toml", clutser="tcp://host:8786")  # type: ignore[call-overload]

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from commands import call
 
-from cosim.cli import set_libraries
 from cosim.support.errors import InputError, UndecidedError
 from cosim.support.near import near as near_of_runner
 from cosim.support.terminal import stage
@@ -29,23 +28,18 @@ def test_what_looks_like_an_emoji_is_said_as_it_was_given(capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
-        (("run", "siderial", "--out", "x"), "sidereal"),
-        (("show", "two_axes"), "two_axis"),
-        (("export", "paper_mont", "--out", "x"), "paper_mount"),
-        (("identify", "run.csv", "--card", "emsp", "--out", "x"), "emps"),
+        ("run siderial --out x", '"sidereal"'),
+        ("show two_axes", '"two_axis"'),
+        ("export paper_mont --out x", '"paper_mount"'),
+        ("identify run.csv --card emsp --out x", '"emps"'),
+        ("diagnos", "'diagnose'"),
+        ("hardware chek", "'check'"),
     ],
 )
-def test_a_name_that_was_nearly_hit_is_suggested(
-    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], meant: str
+def test_a_name_or_a_verb_that_was_nearly_hit_is_suggested(
+    capsys: pytest.CaptureFixture[str], words: str, meant: str
 ) -> None:
-    assert f'Did you mean "{meant}"?' in said(capsys, *words)
-
-
-@pytest.mark.parametrize(("words", "meant"), [(("diagnos",), "diagnose"), (("hardware", "chek"), "check")])
-def test_a_verb_that_was_nearly_hit_is_suggested(
-    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], meant: str
-) -> None:
-    assert f"Did you mean '{meant}'?" in said(capsys, *words)
+    assert f"Did you mean {meant}?" in said(capsys, *words.split())
 
 
 @pytest.mark.parametrize(
@@ -96,9 +90,8 @@ def test_the_runner_and_the_physics_suggest_alike() -> None:
 def test_a_shell_completes_verbs_options_and_shipped_names(line: str, offered: str) -> None:
     words = line.split()
     ask = {"_COSIM_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim"], env=os.environ | ask, capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-m", "cosim"]
+    done = subprocess.run(command, env=os.environ | ask, capture_output=True, text=True, check=False)
     assert offered in done.stdout.split()
 
 
@@ -107,15 +100,3 @@ def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.Capt
         progress.tell("nothing of this")
         progress.log("friction map")
     assert capsys.readouterr().err.splitlines() == ["identifying", "friction map"]
-
-
-@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
-def test_linear_algebra_has_one_thread_unless_told(
-    given: dict[str, str], threads: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    for name, value in given.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setattr(os, "environ", dict(os.environ))  # what is set here ends here
-    set_libraries()
-    assert os.environ["OPENBLAS_NUM_THREADS"] == threads

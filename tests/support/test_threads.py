@@ -1,10 +1,13 @@
 """Calls from Python give linear algebra one thread, and leave the process as it was."""
 
+import os
+
 import numpy  # noqa: F401 brings linear algebra along
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import cosim
+from cosim.cli import set_libraries
 from cosim.support.threads import VARIABLES, in_one_thread
 
 
@@ -35,6 +38,15 @@ def test_a_call_works_in_one_thread_and_gives_the_others_back_when_it_fails() ->
 def test_the_environment_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
     assert in_one_thread(threads)() == {3}
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_the_command_has_one_thread_unless_told(
+    given: dict[str, str], threads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "environ", os.environ | given)  # what is set here ends here
+    set_libraries()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == threads
 
 
 def test_a_diagnosis_and_a_first_card_from_python_have_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
