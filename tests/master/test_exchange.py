@@ -76,20 +76,12 @@ def test_the_solver_meets_cvode_on_a_stiff_oscillator(fmus: dict[tuple[str, int]
 
 
 BALL = r"""
-#include <stddef.h>
-#include <stdlib.h>
 enum { H, V, DH, DV, COUNT };
 typedef struct { double v[COUNT], t, next; int mode, bounces; } M;
 typedef struct { int again, terminate, nominals, values, has_next; double next; } Event;
-#define API __attribute__((visibility("default")))
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) {
   M *m = calloc(1, sizeof(M)); m->v[H] = 1; m->mode = 1; return m; }
-API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
-API int fmi2EnterInitializationMode(void *m) { return 0; }
-API int fmi2ExitInitializationMode(void *m) { return 0; }
-API int fmi2Terminate(void *m) { return 0; }
 API int fmi2Reset(M *m) { *m = (M){{1}}; m->mode = 1; return 0; }
-API void fmi2FreeInstance(void *m) { free(m); }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { while (n--) x[n] = m->v[r[n]]; return 0; }
 API int fmi2SetTime(M *m, double t) { m->t = t; return 0; }
@@ -108,8 +100,6 @@ API int fmi2NewDiscreteStates(M *m, Event *e) {
   if (m->t >= 1.50005) { if (m->next == 0) { m->v[V] += 1; e->values = 1; m->next = 1; } }
   else { e->has_next = 1; e->next = 1.50005; }
   return 0; }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
 """
 DESCRIPTION = """<fmiModelDescription fmiVersion="2.0" modelName="ball" guid="b" numberOfEventIndicators="1">
 <ModelExchange modelIdentifier="ball"/><ModelVariables>

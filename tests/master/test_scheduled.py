@@ -5,24 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from compiling import compiled, packed, with_stubs
-from simulating import simulate
+from simulating import alone, simulate
 
+from cosim.master.exchange import open_fmu
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.wire import Wire
 
 SOURCE = r"""
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdlib.h>
 /* Partitions: 1 every 0.5 s from 0.25 s on, 2 triggered, 3 half a second after each third of 1, 4 every 1 s, first. */
 enum { FAST = 1, HAND, LATER, SLOW, OUT, COUNT = 10, SUM, ORDER, LAST, SCALE };
 typedef struct { int count, sum, order, scale, asked; double last; bool out; } M;
-#define API __attribute__((visibility("default")))
-#define NONE(name) API int name(void) { return 0; }
 API void *fmi3InstantiateScheduledExecution(const char *n, const char *t, const char *r, bool v, bool l, void *e,
   void *log, void *u, void *a, void *b) { M *m = calloc(1, sizeof(M)); m->scale = 1; return m; }
-API void fmi3FreeInstance(void *m) { free(m); }
-NONE(fmi3EnterInitializationMode) NONE(fmi3ExitInitializationMode) NONE(fmi3Terminate)
 API int fmi3Reset(M *m) { *m = (M){.scale = 1}; return 0; }
 API int fmi3ActivateModelPartition(M *m, unsigned clock, double time) {
   m->last = time;
@@ -40,7 +34,6 @@ API int fmi3GetInt32(M *m, const unsigned *r, size_t n, int *x, size_t k) {
   *x = *r == COUNT ? m->count : *r == SUM ? m->sum : *r == ORDER ? m->order : m->scale; return 0; }
 API int fmi3SetInt32(M *m, const unsigned *r, size_t n, const int *x, size_t k) { m->scale = *x; return 0; }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { *x = m->last; return 0; }
-API const char *fmi3GetVersion(void) { return "3.0"; }
 """
 DESCRIPTION = """<fmiModelDescription fmiVersion="3.0" modelName="parts" instantiationToken="p">
 <ScheduledExecution modelIdentifier="parts"/><ModelVariables>
@@ -67,8 +60,8 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_partitions_run_in_the_order_of_time_and_priority(parts: Path) -> None:
-    record = {name: f"p.{name}" for name in ("count", "sum", "order", "last", "out")}
-    seen = simulate({"p": parts}, [], record=record, step=0.5, ticks=6, last=True).recording
+    record = {name: f"one.{name}" for name in ("count", "sum", "order", "last", "out")}
+    seen = alone(parts, [], record, step=0.5, ticks=6, last=True).recording
     np.testing.assert_array_equal(seen["count"], np.arange(7))
     np.testing.assert_array_equal(seen["last"], [0.0, 0.25, 0.75, 1.25, 1.75, 2.25, 2.75])
     np.testing.assert_array_equal(seen["out"], [0, 0, 0, 1, 0, 0, 1])
@@ -78,28 +71,26 @@ def test_partitions_run_in_the_order_of_time_and_priority(parts: Path) -> None:
 
 def test_a_triggered_clock_ticks_where_its_input_says_so(parts: Path) -> None:
     given = {"hand": np.array([1.0, 0, 0, 1, 0, 0]), "two": 2.0}
-    wires = [Wire("hand", "p.hand"), Wire("two", "p.scale")]
-    seen = simulate({"p": parts}, wires, record={"sum": "p.sum"}, step=0.1, ticks=6, signals=given).recording
+    wires = [Wire("hand", "one.hand"), Wire("two", "one.scale")]
+    seen = alone(parts, wires, {"sum": "one.sum"}, ticks=6, signals=given).recording
     np.testing.assert_array_equal(seen["sum"], [0, 20, 20, 20, 40, 40])
 
 
 def test_clocks_count_from_the_start_and_begin_anew(parts: Path) -> None:
     for _ in range(2):
-        seen = simulate({"p": parts}, [], record={"last": "p.last"}, step=0.5, ticks=3, start=10.0).recording
+        seen = alone(parts, [], {"last": "one.last"}, step=0.5, ticks=3, start=10.0).recording
         np.testing.assert_array_equal(seen["last"], [0.0, 10.25, 10.75])
 
 
 def test_a_partition_that_fails_and_a_value_that_does_not_fit_end_the_run_in_a_sentence(parts: Path) -> None:
-    with pytest.raises(StepError, match=r"p returned an error at tick 4 \(0.4 s\)"):
-        simulate({"p": parts}, [("s", "p.hand")], record={"x": "p.sum"}, step=0.1, ticks=9, signals={"s": 1.0})
+    with pytest.raises(StepError, match=r"one returned an error at tick 4 \(0.4 s\)"):
+        alone(parts, [("s", "one.hand")], {"x": "one.sum"}, ticks=9, signals={"s": 1.0})
     with pytest.raises(StepError, match=r'"scale" is fed 0.5, and is of type Int32'):
-        simulate({"p": parts}, [("s", "p.scale")], record={"x": "p.sum"}, step=0.1, ticks=9, signals={"s": 0.5})
+        alone(parts, [("s", "one.scale")], {"x": "one.sum"}, ticks=9, signals={"s": 0.5})
 
 
 def test_what_cannot_be_is_refused(parts: Path, tiny: dict[int, Path]) -> None:
     with pytest.raises(WiringError, match="a Clock cannot hold a Float64"):
         simulate({"p": parts, "t": tiny[3]}, [("t.y", "p.hand")], record={"x": "p.sum"}, step=0.1, ticks=9)
-    from cosim.master.exchange import open_fmu
-
     with pytest.raises(FmuError, match="has no co-simulation interface; it has: scheduled-execution"):
         open_fmu(parts, interface="co-simulation")

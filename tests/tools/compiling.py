@@ -15,6 +15,17 @@ FUNCTIONS = sorted({name for kind in KINDS for name in dir(kind) if name.startsw
 """What FMPy looks for when it loads a library."""
 
 
+HEAD = (
+    "#define _GNU_SOURCE\n"
+    + "".join(f"#include <{one}.h>\n" for one in ("math", "signal", "stdbool", "stddef", "stdint", "stdio", "stdlib"))
+    + "#include <string.h>\n#include <unistd.h>\n"
+    + '#define API __attribute__((visibility("default")))\n'
+)
+GIVEN = {"fmi2GetVersion": "2.0", "fmi2GetTypesPlatform": "default", "fmi3GetVersion": "3.0"}
+QUIET = ("SetupExperiment", "InitializationMode", "Terminate", "EnterEventMode", "EnterContinuousTimeMode", "SetTime")
+"""What succeeds and does nothing where an FMU has no function of its own for it, by the ends of names."""
+
+
 def compiled(name: str, source: str, *flags: str) -> Path:
     """The library `name` of one C file, from the cache in which exported models lie."""
     flags = ("-shared", "-fPIC", "-O1", "-w", *flags)
@@ -23,10 +34,21 @@ def compiled(name: str, source: str, *flags: str) -> Path:
 
 
 def with_stubs(source: str, made: str = "") -> str:
-    """C of an FMU, and the functions that it lacks and no test calls; `made` names those that its macros make."""
+    """C of an FMU with what each needs, and the functions that it lacks; `made` names those that its macros make.
+
+    Of what it lacks, changes of mode succeed and its memory is freed; all else fails, for no test calls it.
+    """
     known = source + made
     lacks = [name for name in FUNCTIONS if f"{name}(" not in known and f"({name})" not in known]
-    return source + "".join(f"API int {name}(void) {{ return 3; }}\n" for name in lacks)
+    return HEAD + source + "".join(_stub(name) for name in lacks)
+
+
+def _stub(name: str) -> str:
+    if name in GIVEN:
+        return f'API const char *{name}(void) {{ return "{GIVEN[name]}"; }}\n'
+    if name.endswith("FreeInstance"):
+        return f"API void {name}(void *m) {{ free(m); }}\n"
+    return f"API int {name}(void) {{ return {0 if name.endswith(QUIET) else 3}; }}\n"
 
 
 def packed(path: Path, version: int, description: str, library: Path) -> Path:

@@ -10,13 +10,6 @@ import pytest
 from compiling import compiled, packed, with_stubs
 
 SOURCE = r"""
-#include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#define API __attribute__((visibility("default")))
-#define NONE(name) API int name(void *m) { (void)m; return 0; }
 enum { MOST = 16, VARIABLES = 64 };
 /* Every variable has room for MOST elements of 8 bytes; an output stands 32 behind its input. */
 typedef struct {
@@ -41,13 +34,9 @@ API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *
   const unsigned *q, size_t w, void *environment, void *log, void *i) { return make(); }
 API int fmi3EnterConfigurationMode(M *m) { m->configuring = true; return 0; }
 API int fmi3ExitConfigurationMode(M *m) { m->configuring = false; return 0; }
-API int fmi3EnterInitializationMode(void *m, bool a, double b, double c, bool d, double e) { return 0; }
-NONE(fmi3ExitInitializationMode) NONE(fmi3Terminate)
 API int fmi3Reset(M *m) { M *n = make(); *m = *n; free(n); return 0; }
-API void fmi3FreeInstance(void *m) { free(m); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
   *e = *x = *y = false; *l = t + h; return step(m); }
-API const char *fmi3GetVersion(void) { return "3.0"; }
 #define VALUES(NAME, TYPE, FIELD) \
 API int fmi3Set##NAME(M *m, const unsigned *r, size_t n, const TYPE *x, size_t k) { \
   for (size_t i = 0, j = 0; i < n; i++) { \
@@ -68,13 +57,8 @@ API int fmi3SetBinary(M *m, const unsigned *r, size_t n, const size_t *s, const 
 API int fmi3GetBinary(M *m, const unsigned *r, size_t n, size_t *s, const unsigned char **x, size_t k) {
   for (size_t i = 0; i < n; i++) { x[i] = m->bytes[r[i]]; s[i] = m->length[r[i]]; } return 0; }
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) { return make(); }
-API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
-NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) NONE(fmi2Terminate)
 API int fmi2Reset(M *m) { return fmi3Reset(m); }
-API void fmi2FreeInstance(void *m) { free(m); }
 API int fmi2DoStep(M *m, double t, double h, int p) { return step(m); }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
 /* In FMI 2 value reference 0 is the input and 1 the output, of each type; the places differ. */
 #define OLD(NAME, TYPE, FIELD, PLACE) \
 API int fmi2Set##NAME(M *m, const unsigned *r, size_t n, const TYPE *x) { \

@@ -15,21 +15,13 @@ DEEDS = (
 )
 STAGES = ("load", "instantiate", "setup", "initialise", "set", "get", "step", "save", "terminate", "free", "rates")
 SOURCE = r"""
-#define _GNU_SOURCE
 #include <fenv.h>
 #include <fcntl.h>
 #include <locale.h>
 #include <pthread.h>
 #include <sched.h>
-#include <signal.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 enum { NOTHING, DIRECTORY, UMASK, LOCALE, ENVIRONMENT, IGNORE, HANDLE, ALARM, BLOCK, CLOSE, REDIRECT, LIMIT, CORES,
   UPWARD, FLUSH, TRAPS, PRECISION, THREAD, HANG, EXIT, CRASH, READ, FAIL };
 enum { LOAD, INSTANTIATE, SETUP, INITIALISE, SET, GET, STEP, SAVE, TERMINATE, FREE, RATES };
@@ -87,12 +79,10 @@ static int get(M *m, const unsigned *r, size_t n, double *x) {
   while (n--) x[n] = m->v[r[n]];
   return at(m, GET);
 }
-#define API __attribute__((visibility("default")))
-#define NONE(name) API int name(void *m) { (void)m; return 0; }
 typedef struct { int newly, terminate, nominals, values, next; double time; } Event;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) { return make(g); }
 API int fmi2SetupExperiment(M *m, int a, double b, double c, int d, double e) { return at(m, SETUP); }
-NONE(fmi2EnterInitializationMode) API int fmi2ExitInitializationMode(M *m) { return at(m, INITIALISE); }
+API int fmi2ExitInitializationMode(M *m) { return at(m, INITIALISE); }
 API int fmi2Terminate(M *m) { return at(m, TERMINATE); }
 API void fmi2FreeInstance(M *m) { at(m, FREE); }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
@@ -103,16 +93,12 @@ API int fmi2DoStep(M *m, double t, double h, int p) { return at(m, STEP); }
 API int fmi2GetFMUstate(M *m, M **s) { if (!*s) *s = malloc(sizeof(M)); **s = *m; return at(m, SAVE); }
 API int fmi2SetFMUstate(M *m, M *s) { *m = *s; return at(m, SAVE); }
 API int fmi2FreeFMUstate(M *m, M **s) { free(*s); *s = NULL; return 0; }
-API int fmi2SetTime(M *m, double t) { return 0; }
 API int fmi2SetContinuousStates(M *m, const double *x, size_t n) { m->v[X] = *x; return 0; }
 API int fmi2GetContinuousStates(M *m, double *x, size_t n) { *x = m->v[X]; return 0; }
 API int fmi2GetNominalsOfContinuousStates(M *m, double *x, size_t n) { *x = 1; return 0; }
 API int fmi2GetDerivatives(M *m, double *x, size_t n) { *x = -0x1.5555555555555p-2 * m->v[X]; return at(m, RATES); }
 API int fmi2CompletedIntegratorStep(M *m, int a, int *e, int *t) { return *e = *t = 0; }
-NONE(fmi2EnterEventMode) NONE(fmi2EnterContinuousTimeMode)
 API int fmi2NewDiscreteStates(M *m, Event *e) { memset(e, 0, sizeof *e); return 0; }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
 API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,
   const unsigned *q, size_t w, void *environment, void *log, void *i) { return make(g); }
 API int fmi3EnterInitializationMode(M *m, bool a, double b, double c, bool d, double e) { return at(m, SETUP); }
@@ -122,7 +108,6 @@ API void fmi3FreeInstance(M *m) { at(m, FREE); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) { return at(m, STEP); }
-API const char *fmi3GetVersion(void) { return "3.0"; }
 """
 VARIABLES = (("a", "input", "0"), ("deed", "parameter", "0"), ("stage", "parameter", "-1"), ("third", "output", ""))
 VARIABLES += (("x", "output", "1"), ("rate", "local", ""))

@@ -24,11 +24,6 @@ from compiling import compiled, with_stubs
 from compiling import packed as pack
 
 SOURCE = r"""
-#include <stdbool.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#define API __attribute__((visibility("default")))
 enum { U, Y, K, C, X, DX, CALLS, LOCAL, ARRAY_U = 8, ARRAY_Y = 12, SIZE = 16 };
 enum { INSTANTIATED, INITIALISING, RUNNING };
 typedef struct { double r[SIZE], home; float f[SIZE]; int n[2], b[2], mode; bool set; char text[2][64], model[32]; } M;
@@ -77,12 +72,9 @@ static int slope(M *m, size_t n, size_t k, const double *seed, double *found) {
   if (!is(m, "square") || n != 1 || k != 1) return 3;
   m->r[CALLS] += 1000; found[0] = -2 * m->r[K] * m->r[U] * seed[0]; return 0; }
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) { return make(g); }
-API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
 API int fmi2EnterInitializationMode(M *m) { m->mode = INITIALISING; return 0; }
 API int fmi2ExitInitializationMode(M *m) { return leave(m); }
-API int fmi2Terminate(void *m) { return 0; }
 API int fmi2Reset(M *m) { M *n = make(m->model); *m = *n; free(n); return 0; }
-API void fmi2FreeInstance(void *m) { free(m); }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
 API int fmi2SetInteger(M *m, const unsigned *r, size_t n, const int *x) { while (n--) m->n[r[n]] = x[n]; return 0; }
@@ -98,14 +90,9 @@ API int fmi2GetString(M *m, const unsigned *r, size_t n, const char **x) {
 API int fmi2DoStep(M *m, double t, double h, int p) { return step(m, h); }
 API int fmi2GetDirectionalDerivative(M *m, const unsigned *y, size_t n, const unsigned *u, size_t k, const double *s,
   double *d) { return slope(m, n, k, s, d); }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
-API int fmi2EnterEventMode(void *m) { return 0; }
-API int fmi2EnterContinuousTimeMode(void *m) { return 0; }
 typedef struct { int again, end, nominals, values, has_next; double next; } Event;
 API int fmi2NewDiscreteStates(void *m, Event *e) { memset(e, 0, sizeof *e); return 0; }
 API int fmi2CompletedIntegratorStep(void *m, int no, int *enter, int *end) { *enter = *end = 0; return 0; }
-API int fmi2SetTime(void *m, double t) { return 0; }
 API int fmi2SetContinuousStates(M *m, const double *x, size_t n) { m->r[X] = x[0]; return 0; }
 API int fmi2GetContinuousStates(M *m, double *x, size_t n) { compute(m); x[0] = m->r[X]; return 0; }
 API int fmi2GetDerivatives(M *m, double *x, size_t n) { compute(m); x[0] = m->r[DX]; return 0; }
@@ -117,9 +104,7 @@ API void *fmi3InstantiateModelExchange(const char *n, const char *g, const char 
 API int fmi3EnterInitializationMode(M *m, bool a, double b, double c, bool d, double e) {
   m->mode = INITIALISING; return 0; }
 API int fmi3ExitInitializationMode(M *m) { return leave(m); }
-API int fmi3Terminate(void *m) { return 0; }
 API int fmi3Reset(M *m) { return fmi2Reset(m); }
-API void fmi3FreeInstance(void *m) { free(m); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3SetFloat32(M *m, const unsigned *r, size_t n, const float *x, size_t k) {
@@ -130,13 +115,9 @@ API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, 
   *e = *x = *y = false; *l = t + h; return step(m, h); }
 API int fmi3GetDirectionalDerivative(M *m, const unsigned *y, size_t n, const unsigned *u, size_t k, const double *s,
   size_t a, double *d, size_t b) { return slope(m, n, k, s, d); }
-API const char *fmi3GetVersion(void) { return "3.0"; }
-API int fmi3EnterEventMode(void *m) { return 0; }
-API int fmi3EnterContinuousTimeMode(void *m) { return 0; }
 API int fmi3UpdateDiscreteStates(void *m, bool *a, bool *b, bool *c, bool *d, bool *e, double *f) {
   *a = *b = *c = *d = *e = false; return 0; }
 API int fmi3CompletedIntegratorStep(void *m, bool no, bool *enter, bool *end) { *enter = *end = false; return 0; }
-API int fmi3SetTime(void *m, double t) { return 0; }
 API int fmi3SetContinuousStates(M *m, const double *x, size_t n) { m->r[X] = x[0]; return 0; }
 API int fmi3GetContinuousStates(M *m, double *x, size_t n) { compute(m); x[0] = m->r[X]; return 0; }
 API int fmi3GetContinuousStateDerivatives(M *m, double *x, size_t n) { compute(m); x[0] = m->r[DX]; return 0; }

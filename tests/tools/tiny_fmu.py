@@ -13,14 +13,6 @@ import pytest
 from compiling import compiled, packed, with_stubs
 
 SOURCE = r"""
-#include <math.h>
-#include <signal.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER, LEAVE, ABORT, SPAWN, END, EARLY };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
@@ -50,15 +42,12 @@ static int step(M *m, double t, double h) {
   if (m->v[STATUS] == CHATTER) return printf("chatter\n"), 0;
   return (int)m->v[STATUS];
 }
-#define API __attribute__((visibility("default")))
-#define NONE(name) API int name(void *m) { (void)m; return 0; }
 API char calls[9]; /* what was called at the end: T terminate, F free */
 static int noted(char c) { calls[strlen(calls)] = c; return 0; }
 typedef struct { Log2 *log; } Callbacks;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
   M *m = make(); m->log = (void *)c->log; strncpy(m->name, n, 98); return m; }
-API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
-NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) API int fmi2Terminate(void *m) { return noted('T'); }
+API int fmi2Terminate(void *m) { return noted('T'); }
 API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; strcpy(n->name, m->name); *m = *n; free(n); return 0; }
 API void fmi2FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi2GetFMUstate(M *m, M **s) { return save(m, s); }
@@ -74,12 +63,9 @@ API int fmi2DoStep(M *m, double t, double h, int p) {
   if (s) ((Log2 *)m->log)(NULL, m->name, 3, "error", "the %s broke", "shaft"); return s; }
 API int fmi2GetBooleanStatus(M *m, int kind, int *value) {
   return *value = kind == 3 && m->v[STATUS] == END, m->v[STATUS] == END ? 0 : 3; }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
 API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,
   const unsigned *q, size_t w, void *environment, void *log, void *i) { M *m = make(); m->log = log; return m; }
-API int fmi3EnterInitializationMode(void *m, bool a, double b, double c, bool d, double e) { return 0; }
-NONE(fmi3ExitInitializationMode) API int fmi3Terminate(void *m) { return noted('T'); }
+API int fmi3Terminate(void *m) { return noted('T'); }
 API int fmi3Reset(M *m) { return fmi2Reset(m); }
 API void fmi3FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
@@ -88,7 +74,6 @@ API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, 
   int s = step(m, t, h); if (s == END) return *x = true, 0;
   if (s == EARLY) return *y = true, *l = t + h / 2, 0;
   if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
-API const char *fmi3GetVersion(void) { return "3.0"; }
 """
 
 
