@@ -42,6 +42,7 @@ static int step(M *m, double t, double h) {
   if (m->v[STATUS] == CHATTER) return printf("chatter\n"), 0;
   return (int)m->v[STATUS];
 }
+#define API __attribute__((visibility("default")))
 API char calls[9]; /* what was called at the end: T terminate, F free */
 static int noted(char c) { calls[strlen(calls)] = c; return 0; }
 typedef struct { Log2 *log; } Callbacks;
