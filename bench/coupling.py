@@ -21,7 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests/tools"))
 from simulating import simulate
-from two_mass import SPRING, START, export  # beside the tests
+from two_mass import SPRING, START, export
 
 import cosim
 from cosim.master.result import RunResult

@@ -89,7 +89,7 @@ def present(module: str) -> bool:
 
 
 def in_tool(tool: str, ssp: Path, steps: int) -> np.ndarray:
-    runner, out = Path(__file__).parents[1] / "tests/tools/ssp_tools.py", ssp.with_suffix(f".{tool}.npy")
+    runner, out = Path(__file__).parent / "ssp_tools.py", ssp.with_suffix(f".{tool}.npy")
     command = [sys.executable, str(runner), tool, str(ssp), str(STEP), str(steps), str(out)]
     subprocess.run(command, check=True, capture_output=True)
     return np.load(out)

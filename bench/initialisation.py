@@ -192,7 +192,7 @@ def ours(archive: Path, case: Case) -> np.ndarray | str:
 
 
 def theirs(archive: Path, case: Case, python: str, tool: str) -> np.ndarray | str:
-    runner, out = Path(__file__).parents[1] / "tests/tools/ssp_tools.py", archive.with_suffix(f".{tool}.npy")
+    runner, out = Path(__file__).parent / "ssp_tools.py", archive.with_suffix(f".{tool}.npy")
     command = [python, str(runner), tool, str(archive), str(STEP), str(STEPS), str(out), case.signal]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     if done.returncode or not out.exists():

@@ -1,6 +1,6 @@
 """Axes drawn at random, each with something concealed, in its loop: on the co-simulated plant, and behind a drive.
 
-The scenario is that of the tests (`investigations.py`) with other numbers. The drive alone has the narrow limits, the
+The scenario is that of `investigations.py` with other numbers. The drive alone has the narrow limits, the
 loop that orders has wide ones: an order beyond, or a speed beyond, reaches the drive, which counts it. The drive is the
 same (`drive.c`) in this process and, at the other end of UDP, as the virtual drive.
 """

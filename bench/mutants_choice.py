@@ -17,7 +17,7 @@ MOST, TOGETHER, MANY = 4, 8, 20
 together, and how many."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked, nor those of `NOT_ASKED`: what only they would notice counts as survived."""
-NOT_ASKED = ("benches", "house", "documents", "studies", "serve")
+NOT_ASKED = ("house", "documents", "studies", "serve")
 DECLARING = {"pyfmi_models": "models/test_parameter_ranges.py", "cosim/hardware": "hardware/test_machine_ranges.py"}
 """Tests of what modules of a folder declare, which do not name it: asked first of lines outside of functions."""
 LOADED = {

@@ -7,4 +7,8 @@ from cosim.cli import set_libraries
 
 set_libraries()
 ROOT = Path(__file__).parents[2]
-sys.path += [str(ROOT / "bench"), str(ROOT)]
+sys.path += [str(ROOT / "bench"), str(ROOT), str(ROOT / "tests" / "tools")]
+
+from tiny_fmu import tiny  # noqa: E402
+
+__all__ = ["tiny"]

@@ -36,7 +36,7 @@ def prove(
     as_json: Annotated[bool, typer.Option("--json", help="Print proof.json instead of the scores.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
-    """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
+    """Blind benchmark: hide effects in simulated recordings, diagnose, open what was sealed, score against the bars."""
     out = out or default_out("prove")
     from cosim_studies.proof.conduct import Benchmark, check, code, conduct
     from cosim_studies.proof.ledger import enlist

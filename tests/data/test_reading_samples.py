@@ -1,6 +1,5 @@
 """Files of machines' own tools, made in their documented formats, are read; docs/reading.md shows how."""
 
-import importlib.util
 import re
 import shlex
 import sqlite3
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from commands import call
 
+from bench import samples as made
 from cosim.cli import repeated
 from cosim.data.preview import Preview, preview
 from cosim.data.recording import Recording
@@ -24,16 +24,6 @@ SAMPLES = ROOT / "tests" / "samples"
 GUIDE = (ROOT / "docs" / "reading.md").read_text("utf-8")
 
 
-def _made() -> Any:
-    spec = importlib.util.spec_from_file_location("samples_made", SAMPLES / "make.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-made = _made()
 ANSWERS = {
     "halsampler.txt": "--columns tau=#1 q=#2 --units q=deg --layout period=5ms",
     "halsampler_tagged.txt": '--columns t=#1 tau=#2 q=#3 --units "t=5 ms" q=deg',

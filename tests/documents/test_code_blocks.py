@@ -1,4 +1,4 @@
-"""Every code block of README and docs: Python runs, TOML is read, and each command line that is typed parses."""
+"""Every code block of README and docs: Python runs, TOML is read, commands parse; what the guides show happens."""
 
 import re
 import shlex
@@ -8,19 +8,27 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+import pandas as pd
 import pytest
+from commands import call
 from typer.main import get_command
 
 import cosim
 from cosim.cli import application, plugged, repeated
-from cosim.cli.verbs import verbs
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
+from cosim.sweeps.conduct import conduct
+from cosim.sweeps.file import read_sweep
+from cosim.system.diagram import draw
+from cosim.system.scenario import read_scenario
 from cosim_serve import example
 from pyfmi_models.card import parse_card
 
 ROOT = Path(__file__).parents[2]
 FENCED = re.compile(r"^( *)```(\w+)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
-TESTED_ELSEWHERE = {"adding_physics.md"}
-"""Its files make a law and an effect: tests/documents/test_new_physics.py."""
+TESTED_ELSEWHERE = "adding_physics.md"
+"""Its files make a law and an effect, in a copy of the packages: tests/documents/test_new_physics.py."""
 
 
 class Block(NamedTuple):
@@ -31,17 +39,18 @@ class Block(NamedTuple):
     text: str
 
 
-def blocks(*languages: str) -> Iterator[Block]:
-    for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        for number, (_, language, text) in enumerate(FENCED.findall(path.read_text("utf-8")), 1):
-            if language in languages:
-                yield Block(f"{path.name} {number}", language, textwrap.dedent(text))
+def blocks(page: Path) -> list[Block]:
+    found = enumerate(FENCED.findall(page.read_text("utf-8")), 1)
+    return [Block(f"{page.name} {number}", language, textwrap.dedent(text)) for number, (_, language, text) in found]
 
 
-def each(*languages: str) -> pytest.MarkDecorator:
-    found = [
-        one for one in blocks(*languages) if one.name.split()[0] not in TESTED_ELSEWHERE or languages != ("python",)
-    ]
+BLOCKS = [one for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] for one in blocks(page)]
+
+
+def each(language: str) -> pytest.MarkDecorator:
+    found = [one for one in BLOCKS if one.language == language]
+    if language != "sh":
+        found = [one for one in found if not one.name.startswith(TESTED_ELSEWHERE)]
     return pytest.mark.parametrize("block", found, ids=[one.name for one in found])
 
 
@@ -73,11 +82,11 @@ def test_a_block_of_python_runs(block: Block, prepared: Path, monkeypatch: pytes
 
 
 @each("toml")
-def test_a_block_of_toml_is_read(block: Block) -> None:
+def test_a_block_of_toml_is_read_and_a_card_makes_a_plant(block: Block) -> None:
     keys = tomllib.loads(block.text)
     assert keys
-    if "friction" in keys and "inertia" in keys.get("mount", {}) and block.name.split()[0] not in TESTED_ELSEWHERE:
-        parse_card(block.text, block.name)
+    if "friction" in keys and "inertia" in keys.get("mount", {}):
+        assert parse_card(block.text, block.name).plant().model().parameters
 
 
 def typed(text: str) -> Iterator[list[str]]:
@@ -87,7 +96,7 @@ def typed(text: str) -> Iterator[list[str]]:
             words = shlex.split(part, comments=True)
             while words and not words[0].endswith("cosim"):
                 words = words[1:] if "cosim" in " ".join(words) else []
-            if len(words) > 1 and words[1] in verbs():
+            if len(words) > 1 and words[1].isalpha():
                 yield words[1:]
 
 
@@ -100,6 +109,7 @@ def test_each_command_that_is_typed_parses(block: Block, monkeypatch: pytest.Mon
         command = get_command(application(asked))
         with command.make_context("cosim", list(asked)) as context:
             verb = command.get_command(context, asked[0])  # type: ignore[attr-defined]
+            assert verb is not None, f"{asked[0]} is no verb"
             if hasattr(verb, "commands"):  # hardware run, ...
                 verb, asked = verb.commands[asked[1]], asked[1:]
             verb.make_context(asked[0], asked[1:], parent=context).close()
@@ -108,4 +118,64 @@ def test_each_command_that_is_typed_parses(block: Block, monkeypatch: pytest.Mon
 def test_command_lines_are_found() -> None:
     (words,) = typed("VAR=1 .venv/bin/cosim run sidereal \\\n  --out a  # a note")
     assert words == ["run", "sidereal", "--out", "a"]
-    assert sum(1 for block in blocks("sh") for _ in typed(block.text)) > 40
+    assert sum(1 for block in BLOCKS if block.language == "sh" for _ in typed(block.text)) > 40
+
+
+# What the guides to scenarios and investigations show is what happens.
+
+
+def guided(page: str, folder: Path) -> list[Block]:
+    """The blocks of a guide; those that begin with the name of a file are written."""
+    found = blocks(ROOT / "docs" / page)
+    for block in found:
+        if named := re.match(r"# (\w+\.\w+)", block.text):
+            (folder / named[1]).write_text(block.text, "utf-8")
+    return found
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    guided("scenarios.md", tmp_path)
+    return tmp_path / "guided.toml"
+
+
+def test_the_drawing_in_the_guide_is_the_one_of_its_scenario_built_or_not(scenario: Path) -> None:
+    drawn = next(text for _, kind, text in blocks(ROOT / "docs" / "scenarios.md") if kind == "text")
+    bare = read_scenario(scenario)
+    assert ["\n".join(draw(one)) for one in (bare, with_fmus(bare))] == [drawn.rstrip("\n")] * 2
+
+
+def test_the_investigation_of_the_guide_puts_its_first_name_right(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = guided("investigate.md", tmp_path)
+    command = next(one.text for one in found if one.text.startswith("cosim investigate loop.toml"))
+    told = next(one.text for one in found if one.language == "text")
+    monkeypatch.chdir(tmp_path)
+    assert call(*next(typed(command))) == 0
+    said = capsys.readouterr().out
+    without_numbers = [re.sub(r"held-out.*| [\d.]+ .*", "", text).splitlines() for text in (told, said)]
+    assert without_numbers[0] == without_numbers[1]
+
+
+def test_the_scenario_of_the_guide_tracks_and_its_encoder_hangs(scenario: Path) -> None:
+    done = run(with_fmus(read_scenario(scenario)))
+    t, seen, reading = (done.recording[name] for name in ("t", "seen", "reading"))
+    hangs = (t >= 1.5) & (t < 1.6)
+    assert np.ptp(reading[hangs]) == 0 < np.ptp(done.recording["q"][hangs])
+    assert done.recording.units["seen"] == "arcsec"
+    assert (np.diff(np.flatnonzero(np.diff(seen))) == 50).all()  # rows, 20 Hz
+    looked = (np.arange(len(t)) // 50 - 1) * 50  # rows; a look is shown one step of the camera later
+    noise = seen - 206264.806 * done.recording["q"][looked]
+    assert 0.02 < noise[t >= 0.05].std() < 0.1
+    assert np.abs(done.recording["q"] - done.recording["q_d"])[(t > 1.0) & (t < 1.5)].max() < 1e-6
+    assert "camera is a Python function: each of its steps costs microseconds." in done.statistics["notes"]
+
+
+def test_the_sweep_of_the_guide_runs(scenario: Path) -> None:
+    sweep = read_sweep(scenario.with_name("many.toml"))
+    done = conduct(sweep, with_fmus(read_scenario(sweep.scenario)), scenario.with_name("many"), workers=2)
+    table = pd.read_parquet(done.table)
+    assert list(table["status"]) == ["ok"] * 8
+    assert table["reference.frequency"].isin([0.1, 0.2]).all()
+    assert table["rms_error"].between(0.001, 10.0).all()

@@ -1,4 +1,4 @@
-"""The documentation site says of every effect what a reader needs, and has a page for every subject."""
+"""The documentation says of every effect, machine and promise what a reader needs, and what its pages draw is so."""
 
 import importlib.util
 import re
@@ -13,44 +13,50 @@ from plain_words import unplain
 from cosim.diagnosis.effects import TRIED
 from pyfmi_models.effects import CATALOGUE
 
-DOCS = Path(__file__).parents[2] / "docs"
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
 PAGES = (
     "card recording_data report theory decision glossary reading scenarios fmus other_tools hardware api architecture"
 )
 
 
-@pytest.fixture(scope="module")
-def gallery() -> Any:
-    sys.path.insert(0, str(DOCS))
-    try:
-        yield importlib.import_module("gallery")
-    finally:
-        sys.path.remove(str(DOCS))
-
-
-def loaded(path: Path) -> Any:
-    """A file of the documentation as a module."""
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec
-    assert spec.loader
-    spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
-    return module
+def page(name: str) -> str:
+    return (DOCS / f"{name}.md").read_text("utf-8")
 
 
 @pytest.fixture
-def site(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    return loaded(DOCS / "conf.py")
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A file of the documentation as a module."""
+    monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
+
+    def loaded(name: str) -> Any:
+        spec = importlib.util.spec_from_file_location(Path(name).stem, DOCS / f"{name}.py")
+        assert spec
+        assert spec.loader
+        spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
+        return module
+
+    return loaded
+
+
+# The gallery of effects.
+
+
+@pytest.fixture
+def gallery(script: Any) -> Any:
+    return script("gallery")
 
 
 @pytest.mark.parametrize("name", sorted(TRIED))
-def test_every_effect_has_equation_words_advice_and_literature(gallery: Any, name: str) -> None:
+def test_every_effect_has_equation_words_advice_and_literature_once(gallery: Any, name: str) -> None:
     for form in CATALOGUE[name]:
         said, literature = gallery.described(form)
         assert said
         assert form.equation
         assert form.action
+    last = [form for form in FORMS if form.id == name][-1]
     assert literature or gallery.LITERATURE[name]
+    assert not (name in gallery.LITERATURE and gallery.described(last)[1]), "told twice"
 
 
 def test_the_gallery_has_a_picture_checks_and_repairs_of_each_effect_and_a_small_picture_that_leads_there(
@@ -69,49 +75,77 @@ def test_the_gallery_has_a_picture_checks_and_repairs_of_each_effect_and_a_small
         assert f'<a href="#{name}"><img src="../_images/{name}.svg"' in text
 
 
-def test_no_literature_is_told_twice(gallery: Any) -> None:
-    assert set(gallery.LITERATURE) <= set(TRIED)
-    last = {form.id: form for form in FORMS if form.id in TRIED}
-    assert [name for name in gallery.LITERATURE if gallery.described(last[name])[1]] == []
-
-
 def test_the_gallery_lists_the_effects_that_a_diagnosis_does_not_look_for(gallery: Any) -> None:
+    assert set(gallery.LITERATURE) <= set(TRIED)
     text = "\n".join(gallery.of_cards_alone())
     assert "A diagnosis does not look for them yet" in text
     assert set(re.findall(r"^`(\w+)`, ", text, re.M)) == set(CATALOGUE) - set(TRIED)
     assert text.count("*Literature:* Wen") == 1
 
 
+# The pages, and where they lead.
+
+
 def test_the_index_leads_to_every_page_that_is_there() -> None:
-    index = (DOCS / "index.md").read_text("utf-8")
-    listed = set(re.findall(r"^([a-z_/]+)$", index, re.M))
+    listed = set(re.findall(r"^([a-z_/]+)$", page("index"), re.M))
     assert {*PAGES.split()} <= listed
     assert all((DOCS / f"{name}.md").exists() for name in listed if not name.startswith("_generated"))
 
 
-def test_links_out_of_the_folder_are_said_as_paths(site: Any) -> None:
-    text = ["see [results](../results/a.md#b) and [x](y.md)"]
-    site.inside_the_site(None, "index", text)
-    assert text == ["see results (`results/a.md` in the source) and [x](y.md)"]
-    text = ["of [the report](../report.md), in [results](../../results/a.md)"]
-    site.inside_the_site(None, "_generated/effects", text)
-    assert text == ["of [the report](../report.md), in results (`results/a.md` in the source)"]
+@pytest.mark.parametrize(
+    ("where", "text", "said"),
+    [
+        ("index", "[results](../results/a.md#b) and [x](y.md)", "results (`results/a.md` in the source) and [x](y.md)"),
+        (
+            "_generated/effects",
+            "of [the report](../report.md), in [results](../../results/a.md)",
+            "of [the report](../report.md), in results (`results/a.md` in the source)",
+        ),
+    ],
+)
+def test_links_out_of_the_folder_are_said_as_paths(script: Any, where: str, text: str, said: str) -> None:
+    script("conf").inside_the_site(None, where, source := [text])
+    assert source == [said]
+
+
+def test_the_pictures_of_the_architecture_are_those_of_the_code(script: Any) -> None:
+    drawing = script("architecture")
+    assert drawing.direct({"c": {"a", "b"}, "b": {"a"}, "a": set()}) == {"c": {"b"}, "b": {"a"}, "a": set()}
+    shown = page("architecture")
+    assert [found[2] for found in drawing.MARK.finditer(shown)] == ["folders", "cosim.system", "cosim.master"]
+    assert drawing.drawn(shown) == shown, "python docs/architecture.py draws them again"
+
+
+def test_the_table_of_folders_names_every_folder() -> None:
+    rows = re.findall(r"^\| (`.*?) \|", page("architecture"), re.MULTILINE)
+    told = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert told == {path.parent.name for path in (ROOT / "cosim").glob("*/__init__.py")}
+
+
+def test_the_glossary_holds_every_term_once_in_the_order_of_the_alphabet() -> None:
+    terms = [one.casefold() for one in re.findall(r"^\*\*(.+?)\*\*", page("glossary"), re.MULTILINE)]
+    assert len(terms) > 30
+    assert terms == sorted(set(terms))
+
+
+def test_every_promise_names_tests_that_there_are() -> None:
+    rows = [one for one in page("promises").splitlines() if one.startswith("| ") and "| tests |" not in one]
+    files = {one.name: one for folder in ("tests", "bench/tests") for one in (ROOT / folder).rglob("test_*.py")}
+    assert rows
+    for row in rows:
+        promise, tests = row.strip("| ").split(" | ")
+        named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", tests)
+        assert named or "`.ci/" in tests, promise
+        for file, name in named:
+            assert f"\ndef {name}(" in files[file].read_text("utf-8"), (file, name)
 
 
 # The gallery of machines: at least six measured ones, each with picture, verdict, what is known and a licence.
 
-PAGE = (DOCS / "machines.md").read_text("utf-8")
-SECTIONS = dict(re.findall(r"^\((\w+)\)=\n(.*?)(?=^\(\w+\)=|\Z)", PAGE, re.DOTALL | re.MULTILINE))
+MACHINES = page("machines")
+SECTIONS = dict(re.findall(r"^\((\w+)\)=\n(.*?)(?=^\(\w+\)=|\Z)", MACHINES, re.DOTALL | re.MULTILINE))
 LARGEST = 60_000
 """Bytes of a picture."""
-
-
-def test_six_machines_are_measured_and_their_licence_is_stated() -> None:
-    measured = {name: text for name, text in SECTIONS.items() if "*Measured.*" in text}
-    assert len(measured) >= 6
-    for name, text in measured.items():
-        assert re.search(r"\b(MIT|BSD 3-Clause|Apache 2\.0)\b", text), name
-    assert all("*Generated from published numbers.*" in text for name, text in SECTIONS.items() if name not in measured)
 
 
 @pytest.mark.parametrize("name", SECTIONS)
@@ -119,52 +153,34 @@ def test_a_machine_has_a_verdict_errors_a_picture_and_a_small_one_that_leads_to_
     text, picture = SECTIONS[name], DOCS / "machines" / f"{name}.png"
     assert picture.stat().st_size < LARGEST
     assert f"](machines/{name}.png)" in text
-    assert f"machines/{name}.png)" in PAGE.split("(brushless_motor)=")[0]
-    assert f"](#{name})" in PAGE
+    assert f"machines/{name}.png)" in MACHINES.split("(brushless_motor)=")[0]
+    assert f"](#{name})" in MACHINES
     assert re.search(r"^\*\*.+\*\*$", text, re.MULTILINE)
     for word in ("*Validation error:*", "*Known of it:*"):
         assert word in text
+    licence = re.search(r"\b(MIT|BSD 3-Clause|Apache 2\.0)\b", text)
+    assert licence if "*Measured.*" in text else "*Generated from published numbers.*" in text
     assert not unplain(text)
 
 
-def test_no_picture_is_of_a_machine_that_the_page_lacks_and_no_recording_lies_beside_them() -> None:
+def test_six_machines_are_measured_and_no_other_picture_or_recording_lies_beside_them() -> None:
+    assert sum("*Measured.*" in text for text in SECTIONS.values()) >= 6
     assert {path.name for path in (DOCS / "machines").iterdir()} == {f"{name}.png" for name in SECTIONS}
-
-
-# docs/promises.md names tests that there are.
-
-TESTS = Path(__file__).parents[1]
-PROMISES = TESTS.parent / "docs" / "promises.md"
-
-
-def test_every_promise_names_tests_that_there_are() -> None:
-    rows = [one for one in PROMISES.read_text("utf-8").splitlines() if one.startswith("| ") and "| tests |" not in one]
-    assert rows
-    for row in rows:
-        promise, tests = row.strip("| ").split(" | ")
-        named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", tests)
-        assert named or "`.ci/" in tests, promise
-        for file, name in named:
-            assert f"\ndef {name}(" in next(TESTS.rglob(file)).read_text("utf-8"), (file, name)
 
 
 # The scripts of the documentation do what they say.
 
 
-def script(name: str) -> Any:
-    return loaded(DOCS / "scripts" / f"{name}.py")
+def test_your_own_axis_is_diagnosed(script: Any) -> None:
+    assert script("scripts/diagnose_your_axis").main() == ("cogging",)
 
 
-def test_your_own_axis_is_diagnosed() -> None:
-    assert script("diagnose_your_axis").main() == ("cogging",)
+def test_your_fmu_runs_beside_the_controller_of_a_card(script: Any) -> None:
+    assert script("scripts/cosimulate_your_fmu").main() <= 0.01  # arcsec; the encoder has counts of 0.0003
 
 
-def test_your_fmu_runs_beside_the_controller_of_a_card() -> None:
-    assert script("cosimulate_your_fmu").main() <= 0.01  # arcsec; the encoder of the card has counts of 0.0003
-
-
-def test_a_controller_is_designed_within_its_limits_and_proven_with_friction() -> None:
-    design = script("design_a_controller")
+def test_a_controller_is_designed_within_its_limits_and_proven_with_friction(script: Any) -> None:
+    design = script("scripts/design_a_controller")
     chosen, before, after = design.main()
     phase, noise = design.limits(design.tuned(design.read_card("paper_mount"), chosen))
     assert phase >= design.LEAST

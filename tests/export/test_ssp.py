@@ -180,7 +180,7 @@ def test_other_tools_run_the_ssp_and_find_the_same_motion(
         importlib.import_module(TOOLS[tool])
     except (ImportError, OSError) as error:
         pytest.skip(f"{tool} is not installed: {error}")
-    runner, out = Path(__file__).parents[1] / "tools" / "ssp_tools.py", tmp_path / "rows.npy"
+    runner, out = Path(__file__).parents[2] / "bench" / "ssp_tools.py", tmp_path / "rows.npy"
     command = [sys.executable, str(runner), tool, str(ssp), "1e-4", str(STEPS), str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]

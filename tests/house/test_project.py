@@ -1,6 +1,7 @@
 """The project on paper is the project as it is: commands, card, version, requirements, files of the package."""
 
 import ast
+import os
 import re
 import shutil
 import subprocess
@@ -15,9 +16,7 @@ import pytest
 import cosim
 from bench import scores
 from bench.rebuild import PAGES
-from cosim.cli.verbs import verbs
 from cosim.diagnosis.effects import TRIED
-from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
@@ -34,11 +33,6 @@ CALLED = {"sklearn": "scikit-learn"}
 BUILT = {".so", ".dylib", ".dll", ".pyc"}
 FOLDERS = {".ci", "bench", "docs", "fmus", "results", "tests"}
 """What the project has at its top beside the packages."""
-
-
-def fenced(language: str) -> list[str]:
-    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```", README, re.MULTILINE | re.DOTALL)
-    return [re.sub(rf"^{indent}", "", text, flags=re.MULTILINE) for indent, text in found]
 
 
 def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
@@ -59,34 +53,24 @@ def test_what_a_run_leaves_is_no_part_of_the_project() -> None:
     assert not strange, f"folders that are committed, and not the project's: {', '.join(sorted(strange))}"
 
 
-def test_every_verb_that_readme_types_exists() -> None:
-    typed = set(re.findall(r"(?:^|/|\s|`)cosim ([a-z]+)\b", "\n".join(fenced("sh")), re.MULTILINE))
-    assert typed
-    missing = sorted(typed - set(verbs()))
-    assert not missing, f"README types verbs that do not exist: {', '.join(missing)}"
-
-
-def test_the_card_in_readme_makes_a_plant(tmp_path: Path) -> None:
-    (card,) = fenced("toml")
-    path = tmp_path / "axis.toml"
-    path.write_text(card, "utf-8")
-    assert read_card(path).plant().model().parameters
-
-
 def test_readme_lists_the_effects_that_a_diagnosis_can_name() -> None:
     limits = README.partition("## Limits")[2]
     assert {name for name in re.findall(r"`([a-z_]+)`", limits) if name in CATALOGUE} == set(TRIED)
 
 
-def test_links_of_the_documents_lead_somewhere() -> None:
-    for document in ROOT.glob("*.md"):
-        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text("utf-8")):
-            assert target.startswith("https://") or (ROOT / target).exists(), f"{document.name}: {target}"
+def test_links_of_documents_and_results_lead_somewhere() -> None:
+    for page in [*ROOT.glob("*.md"), *RESULTS.rglob("*.md")]:
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8")):
+            assert target.startswith("https://") or (page.parent / target).exists(), f"{page}: {target}"
 
 
-def test_no_document_names_a_path_of_one_machine() -> None:
-    for document in [*ROOT.glob("*.md"), ROOT / ".ci" / "run", ROOT / "pyproject.toml"]:
-        assert not re.search(r"(?<![\w.])/(work|home|root|Users)/", document.read_text("utf-8")), document.name
+def test_no_document_or_result_names_a_folder_of_the_machine_that_made_it() -> None:
+    """Whoever rebuilds a result has no such folder: a command is given with paths that begin in the project."""
+    absolute = re.compile(r"(?<![\w./~-])/(?:work|root|home|tmp|mnt|Users)/\w")
+    files = [one for one in RESULTS.rglob("*") if one.suffix in {".md", ".json", ".jsonl", ".csv", ".toml"}]
+    files += [*ROOT.glob("*.md"), ROOT / ".ci" / "run", ROOT / "pyproject.toml"]
+    named = [str(one.relative_to(ROOT)) for one in files if absolute.search(one.read_text("utf-8"))]
+    assert not named, f"these name a folder of one machine: {', '.join(named)}"
 
 
 def test_the_version_is_stated_once_and_is_a_release_or_in_the_making() -> None:
@@ -152,16 +136,10 @@ def test_every_result_is_told_how_it_is_rebuilt() -> None:
             assert (ROOT / file).is_file(), command
 
 
-def test_every_page_of_the_results_is_in_their_list_and_every_link_leads_somewhere() -> None:
+def test_results_are_listed_and_small() -> None:
+    """Proof is read by people: twelve topics and a megabyte; `python bench/slim.py` makes them so."""
     told = (RESULTS / "README.md").read_text("utf-8")
     assert not [one for one in RESULTS.rglob("*.md") if one.name != "README.md" and f"{one.name})" not in told]
-    for page in RESULTS.rglob("*.md"):
-        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8")):
-            assert target.startswith("https://") or (page.parent / target).exists(), f"{page}: {target}"
-
-
-def test_results_are_small() -> None:
-    """Proof is read by people: twelve topics and a megabyte; `python bench/slim.py` makes them so."""
     assert len([one for one in RESULTS.rglob("*") if one.is_dir()]) <= 12
     assert sum(one.stat().st_size for one in RESULTS.rglob("*") if one.is_file()) <= 1_000_000
 
@@ -170,9 +148,38 @@ def test_the_scores_are_those_of_the_results() -> None:
     assert scores.PAGE.read_text("utf-8") == scores.page(), "python bench/scores.py writes results/SCORES.md"
 
 
-def test_no_result_names_a_folder_of_the_machine_that_made_it() -> None:
-    """Whoever rebuilds it has no such folder: a command is given with paths that begin in the project."""
-    absolute = re.compile(r"(?<![\w./~-])/(?:work|root|home|tmp|mnt|Users)/\w")
-    files = [one for one in (ROOT / "results").rglob("*") if one.suffix in {".md", ".json", ".jsonl", ".csv", ".toml"}]
-    named = [str(one.relative_to(ROOT)) for one in files if absolute.search(one.read_text("utf-8"))]
-    assert not named, f"these results name a folder of one machine: {', '.join(named)}"
+# The script that looks for known holes of dependencies: one that hears nothing does not call them clean.
+
+UVX = """#!/bin/sh
+for file; do :; done
+grep -q -E "$HOLES" "$file" || { echo "No known vulnerabilities found"; exit 0; }
+echo "Found 1 known vulnerability in 1 package"; exit 1
+"""
+UV = """#!/bin/sh
+while [ "$1" != --output-file ]; do case $1 in lowest-direct) of=3.1.6;; highest) of=3.2.0;; esac; shift; done
+echo "jinja2==$of" > "$2"
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a script of bash")
+@pytest.mark.parametrize(
+    ("holes", "code", "said"),
+    [
+        ("nothing", 77, "skipped: "),
+        ("==2.10$", 0, "== highest\nNo known"),
+        ("==2.10$|==3.1.6$", 1, "== lowest-direct\nFound 1"),
+        ("==2.10$|==3.2.0$", 1, "== highest\nFound 1"),
+    ],
+)
+def test_dependencies_are_clean_only_where_a_known_hole_is_found(
+    tmp_path: Path, holes: str, code: int, said: str
+) -> None:
+    """Stand-ins for pip-audit and uv: one knows holes of some versions, the other which versions are taken."""
+    for name, text in {"uvx": UVX, "uv": UV}.items():
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "HOLES": holes}
+    done = subprocess.run(
+        [ROOT / ".ci" / "audit"], env=environment, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, said in done.stdout) == (code, True), done.stdout

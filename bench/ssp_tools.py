@@ -1,4 +1,4 @@
-"""Run an SSP in another tool: python tests/tools/ssp_tools.py TOOL FILE.ssp STEP STEPS OUT.npy [SIGNAL ...]
+"""Run an SSP in another tool: python bench/ssp_tools.py TOOL FILE.ssp STEP STEPS OUT.npy [SIGNAL ...]
 
 The file has rows after 0, 1, ... STEPS steps, and a column for each signal; those of SIGNALS where none is named.
 Each tool has a process of its own: two of them are C++ libraries that log and fail in their own ways.

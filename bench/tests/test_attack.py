@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 for name in ("starlette", "uvicorn", "httpx2", "asammdf", "h5py", "mcap"):
     pytest.importorskip(name, reason="an extra is not installed")

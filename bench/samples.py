@@ -1,7 +1,7 @@
-"""Small files as machines' tools write them, made here in the documented formats: `python tests/samples/make.py`.
+"""Small files as machines' tools write them, made here in the documented formats: `python bench/samples.py`.
 
 All hold the same motion of an axis, 0.8 s at 200 Hz: a torque [N.m], a position [rad] and its set point. What each
-format looks like, and where that is documented, stands in docs/reading.md. Text is kept beside this file; what is
+format looks like, and where that is documented, stands in docs/reading.md. Text is kept in tests/samples; what is
 binary is made when a test needs it.
 """
 
@@ -262,4 +262,4 @@ def encoded(name: str) -> bytes:
 
 if __name__ == "__main__":
     for name in TEXTS:
-        (Path(__file__).parent / name).write_bytes(encoded(name))
+        (Path(__file__).parents[1] / "tests" / "samples" / name).write_bytes(encoded(name))

@@ -1,15 +1,15 @@
-"""Draw the architecture from the imports of the code: python tests/house/architecture.py rewrites its page in docs."""
+"""Draw the architecture from the imports of the code: python docs/architecture.py rewrites its page."""
 
 import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / folder) for folder in ("tools", "house")]
 
-from test_arrows import FILES, FLOORS, folder_of, ours
+from test_arrows import FILES, FLOORS, folder_of, ours  # noqa: E402
 
-PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
+PAGE = Path(__file__).with_suffix(".md")
 MARK = re.compile(r"(<!-- drawn: (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 INSIDE = ("cosim.system", "cosim.master")
 """Folders that are drawn file by file."""
