@@ -108,7 +108,7 @@ def present(module: str) -> bool:
 
 
 def load(tool: str, fmi: int, folder: Path) -> float:
-    runner, out = Path(__file__).parents[1] / "tests/tools/fmu_tools.py", folder / "rows.npz"
+    runner, out = Path(__file__).parent / "fmu_tools.py", folder / "rows.npz"
     command = [sys.executable, str(runner), tool, str(folder / f"1{fmi}.fmu"), "1", str(out)]
     subprocess.run(command, check=True, capture_output=True)
     return float(np.load(out)["seconds"])

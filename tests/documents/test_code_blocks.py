@@ -1,4 +1,4 @@
-"""Every code block of README and docs: Python runs, TOML is read, commands parse; what the guides show happens."""
+"""Every code block of README, docs and help: Python runs, TOML is read, commands parse; what guides show happens."""
 
 import re
 import shlex
@@ -16,6 +16,8 @@ from typer.main import get_command
 
 import cosim
 from cosim.cli import application, plugged, repeated
+from cosim.cli.help import epilog
+from cosim.cli.verbs import module_of, verbs
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
 from cosim.sweeps.conduct import conduct
@@ -45,10 +47,11 @@ def blocks(page: Path) -> list[Block]:
 
 
 BLOCKS = [one for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] for one in blocks(page)]
+HELP = [Block(f"help of {verb}", "sh", epilog(verb, module_of(verb))) for verb in verbs()]
 
 
 def each(language: str) -> pytest.MarkDecorator:
-    found = [one for one in BLOCKS if one.language == language]
+    found = [one for one in BLOCKS + HELP if one.language == language]
     if language != "sh":
         found = [one for one in found if not one.name.startswith(TESTED_ELSEWHERE)]
     return pytest.mark.parametrize("block", found, ids=[one.name for one in found])
@@ -112,13 +115,15 @@ def test_each_command_that_is_typed_parses(block: Block, monkeypatch: pytest.Mon
             assert verb is not None, f"{asked[0]} is no verb"
             if hasattr(verb, "commands"):  # hardware run, ...
                 verb, asked = verb.commands[asked[1]], asked[1:]
-            verb.make_context(asked[0], asked[1:], parent=context).close()
+            helped = {"--help", "-h"} & set(words)
+            verb.make_context(asked[0], asked[1:], parent=context, resilient_parsing=bool(helped)).close()
 
 
-def test_command_lines_are_found() -> None:
+def test_command_lines_are_found_and_help_has_two_or_three_of_each_verb() -> None:
     (words,) = typed("VAR=1 .venv/bin/cosim run sidereal \\\n  --out a  # a note")
     assert words == ["run", "sidereal", "--out", "a"]
     assert sum(1 for block in BLOCKS if block.language == "sh" for _ in typed(block.text)) > 40
+    assert {len(list(typed(block.text))) for block in HELP} == {2, 3}
 
 
 # What the guides to scenarios and investigations show is what happens.

@@ -1,44 +1,22 @@
-"""Habits: defaults of a folder, help in groups with examples that parse, a folder of machines diagnosed and resumed."""
+"""Habits: defaults of a folder, help in groups, progress of a diagnosis in stages."""
 
 import json
+import re
+from itertools import count
 from pathlib import Path
 
 import pytest
 from commands import call
-from typer.main import get_command
 
-from cosim.cli import application
-from cosim.cli.help import GROUPS, epilog, group_of
+from cosim.api.progress import Staged, stages_of
+from cosim.cli.help import GROUPS, group_of
 from cosim.cli.settings import read_settings
 from cosim.cli.verbs import module_of, verbs
 from cosim.support.errors import InputError
 
 
-def test_every_verb_has_a_group_and_two_or_three_examples() -> None:
-    assert {verb for verb in verbs() if not 2 <= len(examples(verb)) <= 3} == set()
+def test_help_lists_groups_in_their_order_and_every_verb_has_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert {group_of(verb, module_of(verb)) for verb in verbs()} == {*GROUPS, "Prove"}
-
-
-def examples(verb: str) -> list[str]:
-    return [line.strip() for line in epilog(verb, module_of(verb)).split("\n\n")[1:]]
-
-
-@pytest.mark.parametrize("line", [line for verb in verbs() for line in examples(verb)])
-def test_every_example_of_the_help_parses(line: str) -> None:
-    from cosim.cli import repeated
-
-    words = repeated(line.split()[1:])
-    command = get_command(application(words))
-    helped = [word for word in words if word == "--help"]
-    plain = [word for word in words if word not in helped]
-    with command.make_context("cosim", list(plain)) as context:
-        verb = command.get_command(context, plain[0])  # type: ignore[attr-defined]
-        assert verb is not None
-        with verb.make_context(plain[0], plain[1:], parent=context):
-            pass
-
-
-def test_help_lists_groups_in_their_order(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("--help") == 0
     told = capsys.readouterr().out
     places = [told.index(f"─ {group} ─") for group in (*GROUPS, "Prove")]
@@ -105,3 +83,38 @@ def test_a_run_takes_its_defaults_and_the_command_line_comes_first(
     Path("cosim.toml").write_text("[run]\nstopp = 1\n", "utf-8")
     assert call("run", "sidereal") == 2
     assert "[run] stopp is no option of it" in capsys.readouterr().err
+
+
+# Progress of a diagnosis: stages count up to their number, and the time to go comes down.
+
+TOLD = (
+    "refitting the base",
+    "Delay (1 of 2)",
+    "Cogging (2 of 2)",
+    "proving on the recording that was not fitted",
+    "Delay",
+    "building the improved FMU",
+    "closing the loop",
+    "writing the report",
+)
+
+
+def lines(has_card: bool = True, writes_all: bool = True) -> list[str]:
+    """What is said, with 3 s between any two looks at the clock."""
+    said: list[str] = []
+    staged = Staged(said.append, stages_of(has_card, writes_all), map(float, count(0, 3)).__next__)
+    for text in TOLD if writes_all else TOLD[:5]:
+        staged(text)
+    return said
+
+
+def test_stages_count_up_and_never_back_and_the_time_to_go_comes_down() -> None:
+    said = lines()
+    assert re.findall(r"stage (\d) of 6: ", "\n".join(said)) == ["1", "2", "2", "3", "3", "4", "5", "6"]
+    assert lines(writes_all=False)[-1].startswith("stage 3 of 3: Delay")
+    assert lines(has_card=False)[0].startswith("stage 2 of 7: refitting the base")
+    assert "left" not in said[0]  # nothing is known yet
+    left = [float(seconds) for seconds in re.findall(r"about (\d+) s left", "\n".join(said[3:]))]
+    assert len(left) == 5
+    assert left[-1] < left[0]
+    assert left[-1] <= 3

@@ -1,5 +1,7 @@
-"""Rows of a proof made by hand."""
+"""Rows of a proof made by hand, and tools that stand in for the diagnosis: they run in the process of the tool."""
 
+import os
+from pathlib import Path
 from typing import Any
 
 from cosim_studies.proof.generator import OUTSIDE
@@ -42,3 +44,17 @@ ROWS = [
     row("outside", ["remanence"], ["unknown"]),
     row("outside", ["rubbing"], ["delay"]),
 ]
+
+
+def cautious(folder: str) -> dict[str, Any]:
+    """See exactly what a user has, and say that nothing is missing."""
+    seen = sorted(path.name for path in Path(folder).iterdir())
+    assert seen == ["card.toml", "heldout.parquet", "train_1.parquet", "train_2.parquet"]
+    held = {"before_rms": 2.0, "after_rms": 2.0, "nominal_rms": 3.0}
+    none = {"verdict": [], "ambiguous_with": [], "effects": [], "depends_on": [], "intervals": {}, "windows": {}}
+    return none | {"heldout": held, "baselines": {"refit": {"heldout_rms": 2.0, "alarm": False}}}
+
+
+def crashing(folder: str) -> dict[str, Any]:
+    """End without a word."""
+    os._exit(3)

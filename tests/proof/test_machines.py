@@ -3,13 +3,13 @@
 from collections import Counter
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.signal import butter, filtfilt
 from test_truth import FRICTION, SMOOTH, still
 
 from cosim_studies.proof import truth
 from cosim_studies.proof.beyond import SHAPELESS
-from cosim_studies.proof.cases import SIZES, cases_of
 from cosim_studies.proof.generator import ANY, FAMILIES, OUTSIDE, conceal, make_case, to_toml
 from cosim_studies.proof.machines import MACHINES, suited
 from cosim_studies.proof.motion import Pace
@@ -54,16 +54,7 @@ def test_cards_and_payloads_are_dealt_alike_with_and_without_something_concealed
 def test_a_weight_that_turns_is_concealed_on_rotary_machines_only_and_alone() -> None:
     assert set(suited(())) == set(MACHINES)
     assert {MACHINES[name].motion for name in suited(("cogging", "gravity_unbalance"))} == {"rotary"}
-    setups = [draw_workshop(seed, ("gravity_unbalance",), 1.0).setup for seed in range(30)]
-    assert not any(setup["payload"] for setup in setups)
-
-
-def test_a_deck_spreads_its_sizes_evenly_in_their_logarithm() -> None:
-    sizes = np.log([hand.size for hand in cases_of(4, 400)])
-    low, high = np.log(SIZES)
-    assert low < sizes.min() < low + 0.02
-    assert high - 0.02 < sizes.max() < high
-    assert np.histogram(sizes, 4, (low, high))[0] == pytest.approx([100] * 4, abs=25)
+    assert not any(draw_workshop(seed, ("gravity_unbalance",), 1.0).setup["payload"] for seed in range(30))
 
 
 @pytest.mark.parametrize("name", STROKES)
@@ -123,8 +114,7 @@ def test_effects_without_a_shape_act_on_any_machine(index: int) -> None:
     if case.truth["setup"]["machine"] == null.truth["setup"]["machine"]:
         assert np.ptp(case.heldout.tau - null.heldout.tau) > 0.02 * case.truth["friction_rms"]
     assert case.truth["verdict"] == ["unknown"]
-    assert not set(SHAPELESS) & set(SHAPED)
-    assert {*SHAPELESS, *SHAPED} == set(OUTSIDE)
+    assert sorted([*SHAPELESS, *SHAPED]) == sorted(OUTSIDE)
 
 
 def test_every_family_but_weights_can_be_concealed_in_a_linear_machine() -> None:
@@ -138,43 +128,24 @@ def test_every_family_but_weights_can_be_concealed_in_a_linear_machine() -> None
     assert mount["cogging_cycles"] == pytest.approx(2 * np.pi * found["cycles_per_rev"])  # per metre
 
 
-def test_a_class_that_is_none_is_refused() -> None:
-    with pytest.raises(ValueError, match="no class of machines is called 'tractor'; choices: any, telescope mount"):
-        make_case(1, machine="tractor")
+def apart(one: pd.Series, other: pd.Series) -> float:
+    """How much two differ, of the first."""
+    return float(np.sqrt(np.mean((one - other) ** 2) / np.mean(one**2)))
 
 
-# Rough machines: what is concealed is not quite its equation, and nulls are rough as well.
-
-
-def missing(effects: list[str], rough: bool) -> np.ndarray:
-    case = make_case(11, effects, machine="robot joint", duration=12.0, decoy_columns=False, rough=rough)
-    return case.oracle[0]["extra"].to_numpy()
-
-
-def test_a_concealed_torque_is_off_its_equation_by_some_per_cent() -> None:
-    case = make_case(11, ["gravity_unbalance"], machine="robot joint", duration=12.0, decoy_columns=False, rough=True)
+def test_a_rough_machine_is_off_its_equation_by_some_per_cent_and_a_rough_null_has_other_friction() -> None:
+    given = {"machine": "robot joint", "duration": 12.0, "decoy_columns": False}
+    case, null = (make_case(11, effects, rough=True, **given) for effects in (["gravity_unbalance"], []))
     weight, hidden = case.truth["effects"][0]["parameters"], case.oracle[0]
     equation = weight["mgl"] * np.sin(hidden["angle"] + weight["phase"])
-    off = float(np.sqrt(np.mean((hidden["extra"] - equation) ** 2) / np.mean(equation**2)))
-    assert 0.02 < off < 0.3
-    assert missing([], rough=True) == pytest.approx(0.0), "a null has no torque of its own"
-
-
-def test_a_rough_null_has_other_friction_than_a_smooth_one() -> None:
-    smooth, rough = (
-        make_case(11, [], machine="robot joint", duration=12.0, decoy_columns=False, rough=one) for one in (False, True)
-    )
-    tau = [case.train[0]["tau"].to_numpy() for case in (smooth, rough)]
-    off = float(np.sqrt(np.mean((tau[1] - tau[0]) ** 2) / np.mean(tau[0] ** 2)))
-    assert 0.001 < off < 0.2
+    assert 0.02 < apart(equation, hidden["extra"]) < 0.3
+    assert null.oracle[0]["extra"].to_numpy() == pytest.approx(0.0), "a null has no torque of its own"
+    assert 0.001 < apart(make_case(11, [], **given).train[0]["tau"], null.train[0]["tau"]) < 0.2
 
 
 def test_a_loop_that_swings_up_is_no_machine_and_another_is_drawn() -> None:
     """Of this seed a robot joint whose torque comes 3 ms late to a loop that is too fast for that: 1e72 N m."""
-    given = {"duration": 60.0, "machine": ANY, "rough": True}
-    case = make_case(545360700, ["gravity_unbalance", "delay"], 0.6017380760297837, **given)
-    assert case.truth["seed"] == 545360700
-    assert case.truth["verdict"] == ["gravity_unbalance", "delay"]
-    reach = case.truth["pace"]["amplitude"]
-    for table in (*case.train, case.heldout):
-        assert np.abs(table["q"]).max() < 5 * reach
+    concealed = ["gravity_unbalance", "delay"]
+    case = make_case(545360700, concealed, 0.6017380760297837, duration=60.0, machine=ANY, rough=True)
+    assert (case.truth["seed"], case.truth["verdict"]) == (545360700, concealed)
+    assert max(np.abs(table["q"]).max() for table in (*case.train, case.heldout)) < 5 * case.truth["pace"]["amplitude"]

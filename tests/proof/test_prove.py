@@ -3,17 +3,17 @@
 import json
 from pathlib import Path
 
-import prove_tool
+import numpy as np
 import pytest
 from commands import call
 from imports import imports
-from prove_rows import ROWS, row
+from prove_rows import ROWS, cautious, crashing, row
 from report_example import diagnosis
 
 from cosim.support.errors import OutputError, ProofError
 from cosim.sweeps.journal import RUNS
 from cosim_studies.proof import baselines, marks
-from cosim_studies.proof.cases import TOGETHER, cases_of
+from cosim_studies.proof.cases import SIZES, TOGETHER, cases_of
 from cosim_studies.proof.conduct import Benchmark, conduct
 from cosim_studies.proof.generator import FAMILIES, OUTSIDE
 from cosim_studies.proof.ledger import enlist, listed
@@ -23,10 +23,15 @@ from cosim_studies.proof.tool import scored
 from cosim_studies.verbs.prove import _line
 
 
-def test_a_deck_is_drawn_from_its_seed_alone_and_a_longer_one_begins_alike() -> None:
+def test_a_deck_is_drawn_from_its_seed_alone_a_longer_one_begins_alike_and_sizes_are_even_in_their_logarithm() -> None:
     assert cases_of(3, 40) == cases_of(3, 40)
     assert cases_of(3, 90)[:40] == cases_of(3, 40)
     assert cases_of(4, 40) != cases_of(3, 40)
+    sizes = np.log([hand.size for hand in cases_of(4, 400)])
+    low, high = np.log(SIZES)
+    assert low < sizes.min() < low + 0.02
+    assert high - 0.02 < sizes.max() < high
+    assert np.histogram(sizes, 4, (low, high))[0] == pytest.approx([100] * 4, abs=25)
 
 
 def test_kinds_come_in_their_shares_and_families_in_fair_rotation() -> None:
@@ -60,6 +65,7 @@ def test_a_list_of_decks_keeps_every_line_and_says_what_is_not_fresh(tmp_path: P
 
 
 def test_a_truth_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
+    assert canonical({"b": 1, "a": [1.5]}) == canonical({"a": [1.5], "b": 1}) == '{"a":[1.5],"b":1}'
     truth = {"verdict": ["cogging"], "effects": [{"amplitude": 0.1 + 0.2}]}
     salt = salt_of(5, 0)
     seals = Seals(tmp_path / "seals.jsonl")
@@ -86,8 +92,16 @@ def test_a_seal_that_was_cut_short_is_written_again(tmp_path: Path) -> None:
     assert Seals(path).known == {0: "a" * 64, 1: "b" * 64}
 
 
-def test_the_text_that_is_sealed_does_not_depend_on_the_order_of_keys() -> None:
-    assert canonical({"b": 1, "a": [1.5]}) == canonical({"a": [1.5], "b": 1}) == '{"a":[1.5],"b":1}'
+def test_an_answer_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
+    row = {"run": 0, "answer": {"verdict": ["cogging"], "share": 0.1 + 0.2, "gap": float("nan")}, "status": "ok"}
+    Seals(tmp_path / "seals.jsonl").write_answer(row)
+    seals = Seals(tmp_path / "seals.jsonl")
+    seals.check_answers([json.loads(json.dumps(row))])
+    for change in ({"answer": []}, {"status": "failed"}, {"answer": row["answer"] | {"verdict": []}}):
+        with pytest.raises(ProofError, match="Case 0: its answer is not the answer that was sealed; remove its line"):
+            seals.check_answers([row | change])
+    with pytest.raises(ProofError, match="Case 1: its answer has no seal"):
+        seals.check_answers([row | {"run": 1}])
 
 
 def test_what_makes_cases_shares_nothing_with_what_is_tested() -> None:
@@ -112,16 +126,14 @@ def test_what_a_diagnosis_says_is_what_is_scored() -> None:
     assert set(baselines.compared(found.traces, names=("refit", "kernel"))) == {"refit", "kernel"}
 
 
-@pytest.fixture
-def tools(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the process of the tool import what stands in for it."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
-
-
-@pytest.mark.usefixtures("tools")
-def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path: Path) -> None:
+def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(
+        "PYTHONPATH", str(Path(__file__).parent)
+    )  # the process of the tool imports what stands in for it
     told: list[str] = []
-    wanted = {"workers": 1, "tool": prove_tool.cautious, "on_seal": told.append}
+    wanted = {"workers": 1, "tool": cautious, "on_seal": told.append}
     out = tmp_path / "proof"
     first = conduct(Benchmark(5, 1, 10.0), out, **wanted)
     before = (out / RUNS).read_text()
@@ -139,13 +151,8 @@ def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path: Path
     (out / RUNS).write_text((out / RUNS).read_text().replace('"blend": ', '"blend": 1', 1))
     with pytest.raises(ProofError, match="is not the truth that was sealed"):
         conduct(Benchmark(5, 2, 10.0), out, **wanted)
-
-
-@pytest.mark.usefixtures("tools")
-def test_a_crash_of_the_tool_is_a_row_and_not_the_end(tmp_path: Path) -> None:
-    found = conduct(Benchmark(5, 1, 10.0), tmp_path, workers=1, tool=prove_tool.crashing)
-    assert found["rows"][0]["status"] == "crashed"
-    assert "code 3" in found["rows"][0]["reason"]
+    crashed = conduct(Benchmark(5, 1, 10.0), tmp_path / "crashed", workers=1, tool=crashing)["rows"][0]
+    assert (crashed["status"], "code 3" in crashed["reason"]) == ("crashed", True)  # a row, and not the end
 
 
 def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:

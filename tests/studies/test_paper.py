@@ -42,9 +42,9 @@ def base(workshop: Workshop) -> dict[str, float]:
     return ise(workshop, condition("base"))
 
 
-@pytest.fixture(scope="module")
-def ideal(workshop: Workshop) -> dict[str, float]:
-    return ise(workshop, condition("ideal"))
+def test_many_jobs_go_to_many_processes_and_keep_their_order() -> None:
+    with everywhere(8) as spread:
+        assert list(spread(abs, [-k for k in range(8)])) == list(range(8))
 
 
 def _interrupted() -> None:
@@ -54,41 +54,36 @@ def _interrupted() -> None:
         raise KeyboardInterrupt
 
 
-def test_an_interrupt_ends_what_waits_without_a_word(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        _interrupted()
-    assert "Traceback" not in capfd.readouterr().err
-
-
 def _ended(_: int) -> None:
     """What the computer does to a process when its memory is full."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_process_that_is_ended_from_outside_is_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_or_an_end_from_outside_is_told_without_a_traceback(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted()
     with pytest.raises(CosimError, match=r"was ended from outside, or had no memory left"), everywhere(8) as spread:
         list(spread(_ended, range(8)))
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_with_matched_parameters_only_the_dynamic_model_compensates_friction(ideal: dict[str, float]) -> None:
+def test_with_matched_parameters_only_the_dynamic_model_compensates_friction(workshop: Workshop) -> None:
+    ideal = ise(workshop, condition("ideal"))
     ratio = {case: value / ideal["C1"] for case, value in ideal.items()}
     assert max(ratio["C2a"], ratio["C3a"]) < 1e-3
     assert ratio["C2b"] > 0.3
     assert ratio["C3b"] > 0.7
 
 
-def test_the_base_case_costs_what_the_errata_found(base: dict[str, float]) -> None:
+def test_the_base_case_costs_what_the_errata_found(workshop: Workshop, base: dict[str, float]) -> None:
     """ISE in arcsec^2 s; the errata's controller is not sampled, which is worth 0.8 % of C1 and .008 of C3b/C1."""
     assert base["C1"] == pytest.approx(93.2, rel=0.01)
     assert base["C3b"] / base["C1"] == pytest.approx(0.736, abs=0.01)
     assert base["C2b"] / base["C1"] == pytest.approx(0.353, abs=0.01)
     assert base["C3a"] / base["C1"] == pytest.approx(0.013, abs=0.002)
     assert not in_order(base)  # without noise C2b helps
-
-
-def test_a_higher_position_gain_costs_a_fifth_less(workshop: Workshop) -> None:
-    assert ise(workshop, condition("base_kp255"), "C1")["C1"] == pytest.approx(75.2, rel=0.01)
+    higher = ise(workshop, condition("base_kp255"), "C1")["C1"]  # a higher position gain costs a fifth less
+    assert higher == pytest.approx(75.2, rel=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -129,11 +124,6 @@ def test_statistics_are_means_of_ratios() -> None:
     found = statistics([PAPER, {"C1": 1.0, "C2a": 0.5, "C2b": 0.5, "C3a": 0.1, "C3b": 0.8}])
     assert found["mean_ratio"]["C2a"] == pytest.approx((12.75 / 47.58 + 0.5) / 2)
     assert (found["order_share"], found["seeds"]) == (0.5, 2)
-
-
-def test_many_jobs_go_to_many_processes_and_keep_their_order() -> None:
-    with everywhere(8) as spread:
-        assert list(spread(abs, [-k for k in range(8)])) == list(range(8))
 
 
 @pytest.fixture(scope="module")
@@ -204,18 +194,14 @@ def test_table_4_is_written_as_the_contract_says(written: Written) -> None:
     assert table["realistic"]["mean_ratio"]["C2a"] == pytest.approx(12.75 / 47.58)
 
 
-def test_every_file_is_small_and_named_on_the_page(written: Written) -> None:
+def test_every_file_is_small_and_named_on_the_page_which_says_what_is_not_as_expected(written: Written) -> None:
     page = next(path for path in written.files if path.name == "README.md").read_text()
     assert "| the paper, measured | 47.58 | 0.268 | 1.549 | 0.195 | 0.868 | yes |" in page
     for path in written.files:
         assert path.stat().st_size < 500_000
         assert path.name == "README.md" or f"]({path.name})" in page
-
-
-def test_what_is_not_as_expected_is_said(written: Written) -> None:
     missed = [check.name for check in checks(written.table) if not check.met]
     assert "base: C1 [arcsec^2 s]" in missed
-    page = next(path for path in written.files if path.name == "README.md").read_text()
     assert page.count("**no**") == len(missed)
 
 

@@ -89,11 +89,8 @@ def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
     problem = Problem(MOUNT, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
     base = problem.fit(MOUNT, 25)
     comparison = Comparison.of(problem, base, POLICY)
-    return (
-        comparison,
-        base,
-        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, PROTOCOL_HZ)).as_delivered(),
-    )
+    predictive = Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, PROTOCOL_HZ))
+    return comparison, base, predictive.as_delivered()
 
 
 @cache

@@ -10,8 +10,6 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 RATE = 200
 """Rows in a second."""
-
-
 TORQUE = 2.0
 """Of every row for which no other is said."""
 
@@ -29,18 +27,10 @@ class Motion:
         many = [len(one) for one in speeds]
         q = self.columns.get("q", [np.zeros(count) for count in many])
         asked = self.asked or [True] * len(many)
-        rows = {"dt": 1 / RATE, "cutoff": RATE}
+        shared = {"dt": 1 / RATE, "cutoff": RATE, "inside": slice(1, -1)}
         return [
-            SimpleNamespace(
-                kept=np.arange(len(v)),
-                t=np.arange(len(v)) / RATE,
-                q=place,
-                v=v,
-                inside=slice(1, -1),
-                is_asked=wanted,
-                **rows,
-            )
-            for v, place, wanted in zip(speeds, q, asked, strict=True)
+            SimpleNamespace(kept=np.arange(n), t=np.arange(n) / RATE, q=place, v=v, is_asked=wanted, **shared)
+            for n, v, place, wanted in zip(many, speeds, q, asked, strict=True)
         ]
 
     @property

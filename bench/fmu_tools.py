@@ -1,4 +1,4 @@
-"""Load one FMU in another tool and step it: python tests/tools/fmu_tools.py TOOL FILE.fmu STEPS OUT.npz
+"""Load one FMU in another tool and step it: python bench/fmu_tools.py TOOL FILE.fmu STEPS OUT.npz
 
 Writes the rows of all outputs after 1, 2, ... STEPS steps under the inputs of START, and the seconds from the
 path to the end of the first step. Each tool has a process of its own: two of them are C++ libraries that log and fail
