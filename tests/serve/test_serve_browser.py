@@ -15,20 +15,8 @@ import pytest
 import serve_work
 from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
 from mortal import mortal
-from serving import (  # skips without the extra [serve]
-    CARD,
-    HERE,
-    TOKEN,
-    act,
-    client_of,
-    desk_at,
-    id_of,
-    listened,
-    new,
-    put,
-    recording,
-    until,
-)
+from serving import CARD, HERE, TOKEN, client_of, desk_at, done, listened, recording, until  # skips without [serve]
+from serving import ready as draft
 
 from cosim_serve.desk import Desk
 
@@ -301,12 +289,7 @@ def test_two_diagnoses_are_chosen_in_the_history_and_compared(browser: Any, tmp_
     with desk_at(tmp_path / "data", serve_work.comparing) as desk, listened(desk) as port:
         client = client_of(desk)
         for names in (("run1.csv", "heldout.csv"), ("run1.csv",)):
-            job = new(client)
-            for seed, name in enumerate(names):
-                put(client, job, name, recording(seed=seed))
-            put(client, job, "axis.toml", CARD.encode())
-            act(client, job, "start")
-            until(lambda job=job: not desk.store.get(id_of(job)).live)  # type: ignore[misc]
+            done(client, desk, draft(client, *names))
         with opened(browser, f"http://127.0.0.1:{port}/?token={TOKEN}", DESK) as page:
             for box in page.locator(".choose input").all():
                 box.check()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import serve_work
 from report_example import diagnosis
-from serving import CARD, act, client_of, desk_at, id_of, new, put, ready, recording, until
+from serving import client_of, desk_at, done, id_of, new, ready
 from starlette.testclient import TestClient
 
 from cosim_serve import comparison
@@ -28,23 +28,8 @@ def client(desk: Desk) -> TestClient:
     return client_of(desk)
 
 
-def done(client: TestClient, desk: Desk, job: str) -> str:
-    """The id of a job after its diagnosis."""
-    act(client, job, "start")
-    until(lambda: not desk.store.get(id_of(job)).live)
-    assert desk.store.get(id_of(job)).state == "done"
-    return id_of(job)
-
-
-def lone(client: TestClient) -> str:
-    job = new(client)
-    put(client, job, "alone.csv", recording())
-    put(client, job, "axis.toml", CARD.encode())
-    return job
-
-
 def test_two_diagnoses_stand_in_one_table_with_both_overlays(client: TestClient, desk: Desk) -> None:
-    ids = [done(client, desk, job) for job in (ready(client), lone(client))]
+    ids = [done(client, desk, job) for job in (ready(client), ready(client, "alone.csv"))]
     home = client.get("/").text
     assert home.count('form="compare"') == 2
     assert "run1.csv, heldout.csv" in home
@@ -69,7 +54,7 @@ def test_others_than_two_that_are_done_are_a_sentence(client: TestClient, desk: 
 
 
 def test_what_an_older_version_made_is_compared_as_far_as_it_goes(client: TestClient, desk: Desk) -> None:
-    ids = [done(client, desk, job) for job in (ready(client), lone(client))]
+    ids = [done(client, desk, job) for job in (ready(client), ready(client, "alone.csv"))]
     path = desk.store.result(ids[0]) / comparison.FILE
     for text in ("", "{}", "[1]", '{"heading": 3}'):
         path.write_text(text, "utf-8")

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from serving import CARD, act, id_of, new, put, ready, recording, until
-from serving import state as state_of
+from serving import CARD, act, done, id_of, new, put, ready, recording
 from starlette.testclient import TestClient
 
 from cosim_serve.desk import Desk
@@ -84,8 +83,7 @@ def test_a_server_starts_beside_jobs_that_cannot_be_read(client: TestClient, des
     for job, values in zip(jobs, ABSURD.values(), strict=True):
         note(desk, job).write_bytes(altered(desk, job, **values))
     good = ready(client)
-    act(client, good, "start")
-    until(lambda: state_of(desk, good).state == "done")
+    done(client, desk, good)
     again = Desk(desk.store.home, reader=desk.reader)
     assert [one.id for one in again.store.all()] == [id_of(good)]
     again.queue.close()
@@ -105,34 +103,30 @@ def test_a_damaged_view_is_told_and_is_made_anew(client: TestClient, desk: Desk,
         role = "heldout" if name.startswith("held") else "train"
         assert act(client, job, "correct", file=name, role=role).status_code == 200
     act(client, job, "card", text=CARD)
-    assert act(client, job, "start").status_code == 200
-    until(lambda: state_of(desk, job).state == "done")
+    done(client, desk, job)
 
 
-def secret(tmp_path: Path) -> Path:
-    path = tmp_path / "secret"
-    path.write_text("t,tau,q\n" + "".join(f"{k},{k},SECRET\n" for k in range(50)), "utf-8")
-    return path
-
-
-def test_what_is_no_plain_file_in_a_result_is_neither_listed_nor_served(
+def test_what_is_no_plain_file_in_a_result_or_a_view_is_neither_listed_nor_served(
     client: TestClient, desk: Desk, tmp_path: Path
 ) -> None:
     job = ready(client)
-    act(client, job, "start")
-    until(lambda: state_of(desk, job).state == "done")
-    folder = desk.store.result(id_of(job))
+    folder, secret = desk.store.result(done(client, desk, job)), tmp_path / "secret"
+    secret.write_text('{"problem": "SECRET"}', "utf-8")
+    for path in (note(desk, job).parent / "views").iterdir():
+        path.unlink()
+        path.symlink_to(secret)
     for name in ("diagnosis.json", "a.fmu"):
-        (folder / name).symlink_to(secret(tmp_path))
+        (folder / name).symlink_to(secret)
     os.mkfifo(folder / "b.fmu")
     (folder / "c.fmu").symlink_to("/dev/zero")
     (folder / "report.html").unlink()
-    (folder / "report.html").symlink_to(secret(tmp_path))
+    (folder / "report.html").symlink_to(secret)
     page = client.get(job).text
     for name in ("diagnosis.json", "a.fmu", "b.fmu", "c.fmu", "report.html"):
         assert name not in page
         assert client.get(f"{job}/result/{name}").status_code == 404
     assert client.get(f"{job}/result/card.toml").status_code == 200
+    assert "SECRET" not in page, "a view that is a link"
 
 
 @pytest.mark.parametrize("what", ["recordings/run1.csv", "card.toml", "job.json", "recordings", "views", "result", ""])
@@ -156,13 +150,3 @@ def test_what_leads_out_of_a_job_is_not_followed(
     assert act(client, job, "remove").status_code == 200
     assert not os.path.lexists(desk.store.home / id_of(job))
     assert sorted(one.name for one in kept.rglob("*")) == before, "what a link leads to stays"
-
-
-def test_a_view_that_is_a_link_is_not_followed(client: TestClient, desk: Desk, tmp_path: Path) -> None:
-    job = ready(client)
-    told = tmp_path / "told"
-    told.write_text('{"problem": "SECRET"}', "utf-8")
-    for path in (note(desk, job).parent / "views").iterdir():
-        path.unlink()
-        path.symlink_to(told)
-    assert "SECRET" not in client.get(job).text

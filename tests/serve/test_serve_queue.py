@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import serve_work
 from serve_work import NOTE
-from serving import CARD, act, alive, client_of, desk_at, id_of, kept, new, put, ready, recording, until
+from serving import CARD, act, alive, client_of, desk_at, done, id_of, kept, new, put, ready, recording, until
 from serving import state as state_of
 from starlette.testclient import TestClient
 
@@ -25,8 +25,7 @@ def slow(tmp_path: Path) -> Iterator[Desk]:
 
 def test_a_diagnosis_leads_to_its_report_and_files(client: TestClient, desk: Desk) -> None:
     job = ready(client)
-    act(client, job, "start")
-    until(lambda: not state_of(desk, job).live)
+    done(client, desk, job)
     page = client.get(job).text
     assert "One effect is missing from the model" in page
     report = client.get(f"{job}/result/report.html")
@@ -42,8 +41,7 @@ def test_a_diagnosis_leads_to_its_report_and_files(client: TestClient, desk: Des
     act(client, job, "remove")
     assert client.get(job).status_code == 404
     assert put(client, copy, "run2.csv", recording()).status_code == 201
-    act(client, copy, "start")
-    until(lambda: state_of(desk, copy).state == "done")
+    done(client, desk, copy)
 
 
 def test_one_diagnosis_at_a_time_and_the_next_when_it_is_gone(slow: Desk) -> None:

@@ -61,10 +61,10 @@ def new(client: TestClient) -> str:
     return str(client.post("/jobs").url.path)
 
 
-def ready(client: TestClient) -> str:
+def ready(client: TestClient, *names: str) -> str:
     """The address of a draft that can be diagnosed."""
     job = new(client)
-    for number, name in enumerate(("run1.csv", "heldout.csv")):
+    for number, name in enumerate(names or ("run1.csv", "heldout.csv")):
         assert put(client, job, name, recording(seed=number)).status_code == 201
     assert put(client, job, "axis.toml", CARD.encode()).status_code == 201
     return job
@@ -83,6 +83,14 @@ def until(true: Callable[[], Any], seconds: float = 120.0) -> None:
 
 def state(desk: Desk, job: str) -> Job:
     return desk.store.get(id_of(job))
+
+
+def done(client: TestClient, desk: Desk, job: str, ends: str = "done") -> str:
+    """The id of a job after its diagnosis."""
+    act(client, job, "start")
+    until(lambda: not state(desk, job).live)
+    assert state(desk, job).state == ends
+    return id_of(job)
 
 
 def alive(pid: int) -> bool:
