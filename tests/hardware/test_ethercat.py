@@ -10,6 +10,7 @@ import fake_soem
 import numpy as np
 import pytest
 from on_hardware import SIMULATED, assert_safe, recorded, scenario
+from pydantic import ValidationError
 
 from cosim.hardware.machine import Machine, changed, parse_machine
 from cosim.hardware.replay import replay
@@ -53,18 +54,22 @@ def test_a_layout_is_the_entries_one_after_the_other_little_endian_and_signed_wh
     raw = layout.pack({"controlword": 0x800F, "torque": -2, "mode": 10})
     assert raw == bytes.fromhex("0f80 00000000 feff 0a")
     assert layout.unpack(raw) == {"controlword": 0x800F, "torque": -2, "mode": 10}
-    assert layout.entries[1].mapped == 0x60FE0120
+    assert [layout.entries[1].mapped, Entry(object=0x60FE, subindex=255, bits=32).mapped] == [0x60FE0120, 0x60FEFF20]
 
 
-def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_says() -> None:
-    """docs/hardware.md shows the section with all defaults; subindices are 0 where none is given."""
+def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_and_cia_402_say() -> None:
+    """docs/hardware.md shows the section with all defaults; CiA 402-2: objects and sizes; ETG.1000.6: first PDOs."""
     text = (Path(__file__).parents[2] / "docs" / "hardware.md").read_text("utf-8")
     shown = tomllib.loads("[ethercat]" + text.partition("```toml\n[ethercat]")[2].partition("```")[0])["ethercat"]
     default = Ethercat(rated_torque=100.0)
     assert Ethercat(**shown) == default
     assert default.model_fields_set == {"rated_torque"}
     assert shown.keys() == default.model_dump().keys()
-    assert {one.mapped & 0xFF00 for one in (*default.outputs, *default.inputs)} == {0}
+    assert (default.position, default.receive_pdo, default.transmit_pdo) == (0, 0x1600, 0x1A00)
+    assert not default.distributed_clock
+    assert [one.mapped for one in default.outputs] == [0x60400010, 0x60710010, 0x60600008]
+    assert [one.mapped for one in default.inputs] == [0x60410010, 0x60640020, 0x60770010, 0x60610008]
+    assert (Layout(default.outputs).size, Layout(default.inputs).size) == (5, 9)
 
 
 def test_a_drive_on_the_bus_goes_up_gives_torque_in_per_mille_and_comes_down(
@@ -235,3 +240,16 @@ def test_a_slave_is_looked_at_every_few_cycles(tmp_path: Path, bus: type[fake_so
         looks = [k for k, what in enumerate(bus.last.told[before:]) if what == ("read_state",)]
     assert len(looks) == 3
     assert set(np.diff(looks)) == {2 * CHECKED_EVERY + 1}, "each cycle sends and receives"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"object": 0}, {"object": 0x10000}, {"subindex": -1}, {"subindex": 256}, {"bits": 64}]
+)
+def test_an_object_beyond_its_index_is_refused(wrong: dict[str, Any]) -> None:
+    Entry(object=0xFFFF, bits=8)
+    Entry(object=1, bits=8)
+    with pytest.raises(ValidationError):
+        Entry(**({"object": 0x6040, "bits": 16} | wrong))
+    for numbers in ({"rated_torque": 0.0}, {"rated_torque": 1.0, "position": -1}):
+        with pytest.raises(ValidationError):
+            Ethercat(**numbers)  # type: ignore[arg-type]

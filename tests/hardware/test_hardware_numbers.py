@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import call
-from on_hardware import SIMULATED, machine, scenario, session
+from on_hardware import SIMULATED, scenario, session
 from pydantic import ValidationError
 
 from cosim.data.recording import Recording
@@ -24,7 +24,6 @@ from cosim.hardware.simulated import _injection
 from cosim.hardware.udp import UdpDrive, key_of
 from cosim.hardware.wired import _check_controller
 from cosim.support.errors import HardwareError
-from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
 SOURCES = Path(structures.__file__).parent
 STEP = 1e-4
@@ -113,46 +112,18 @@ def test_an_axis_and_its_session_have_the_numbers_of_their_files(tmp_path: Path)
         assert (told["real_time"], told["heads_left_out"]) == (False, {})
 
 
-def test_a_fault_of_a_drive_begins_and_ends_at_its_cycles() -> None:
-    found = _injection(Inject(kind="stray_head", at=0.02, lasts=0.005, size=2.5, head=3), STEP)
-    assert (found.kind, found.first, found.last) == (words.INJECTIONS.index("stray_head"), 200, 250)
-    assert (found.size, found.head) == (2.5, 3)
-    always = machine(kind="lost").inject[0]
-    assert (always.lasts, always.size, always.head) == (1e9, 0.0, 0), "docs/hardware.md: it stays"
-
-
 @pytest.mark.parametrize(
     "wrong", [{"at": -1e-9}, {"at": 1.001e12}, {"lasts": 0.0}, {"lasts": 1.001e12}, {"head": -1}, {"head": 4}]
 )
-def test_a_fault_at_no_time_or_of_no_head_is_refused(wrong: dict[str, Any]) -> None:
-    Inject(**({"kind": "lost", "at": 0.0}))
+def test_a_fault_of_a_drive_has_cycles_and_one_at_no_time_or_of_no_head_is_refused(wrong: dict[str, Any]) -> None:
+    found = _injection(Inject(kind="stray_head", at=0.02, lasts=0.005, size=2.5, head=3), STEP)
+    assert (found.kind, found.first, found.last) == (words.INJECTIONS.index("stray_head"), 200, 250)
+    assert (found.size, found.head) == (2.5, 3)
+    always = Inject(**({"kind": "lost", "at": 0.0}))
+    assert (always.lasts, always.size, always.head) == (1e9, 0.0, 0), "docs/hardware.md: it stays"
     Inject(kind="frozen_head", at=1e12, lasts=1e12, head=3)
     with pytest.raises(ValidationError):
         Inject(**({"kind": "lost", "at": 0.0} | wrong))
-
-
-def test_without_more_words_the_mapping_is_that_of_cia_402() -> None:
-    """CiA 402-2: objects and their sizes; ETG.1000.6: the first PDOs of each way are 0x1600 and 0x1A00."""
-    plain = Ethercat(rated_torque=1.0)
-    assert (plain.position, plain.receive_pdo, plain.transmit_pdo) == (0, 0x1600, 0x1A00)
-    assert not plain.distributed_clock
-    assert [one.mapped for one in plain.outputs] == [0x60400010, 0x60710010, 0x60600008]
-    assert [one.mapped for one in plain.inputs] == [0x60410010, 0x60640020, 0x60770010, 0x60610008]
-    assert (Layout(plain.outputs).size, Layout(plain.inputs).size) == (5, 9)
-    assert Entry(object=0x60FE, subindex=255, bits=32).mapped == 0x60FEFF20
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"object": 0}, {"object": 0x10000}, {"subindex": -1}, {"subindex": 256}, {"bits": 64}]
-)
-def test_an_object_beyond_its_index_is_refused(wrong: dict[str, Any]) -> None:
-    Entry(object=0xFFFF, bits=8)
-    Entry(object=1, bits=8)
-    with pytest.raises(ValidationError):
-        Entry(**({"object": 0x6040, "bits": 16} | wrong))
-    for numbers in ({"rated_torque": 0.0}, {"rated_torque": 1.0, "position": -1}):
-        with pytest.raises(ValidationError):
-            Ethercat(**numbers)  # type: ignore[arg-type]
 
 
 def test_what_has_no_whole_answer_is_lost() -> None:

@@ -53,13 +53,6 @@ def sealed(recording: Recording) -> Recording:
     )
 
 
-def test_what_was_recorded_is_identical(whole: Recording) -> None:
-    done = replay(whole)
-    assert (done.identical, done.noticed, done.first) == (True, "", -1)
-    assert set(done.different) == set(whole)
-    assert done.stepped > 1000
-
-
 def test_a_changed_bit_in_any_column_is_seen(whole: Recording) -> None:
     """What only enters the loop (set points, a torque below what the loop tells apart) needs the seal; all else not."""
     row = len(whole) // 2
@@ -98,8 +91,11 @@ def test_what_is_cut_off_is_seen(whole: Recording) -> None:
     assert not done.identical
 
 
-def test_the_seal_is_checked(whole: Recording) -> None:
-    assert broken_seal(whole) == ""
+def test_what_was_recorded_is_identical_and_its_seal_is_checked(whole: Recording) -> None:
+    done = replay(whole)
+    assert (done.identical, done.noticed, done.first, broken_seal(whole)) == (True, "", -1, "")
+    assert set(done.different) == set(whole)
+    assert done.stepped > 1000
     other = seal_of(whole.table | {"extra": np.zeros(len(whole))}, whole.origin["hardware"])
     for seal, reason in [
         (None, "it has no seal, or one that is damaged"),

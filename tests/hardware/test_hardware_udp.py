@@ -162,12 +162,14 @@ def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
     assert np.all(found["machine.counts"] == (7 if noticed == "good" else 0))
 
 
-def test_a_loop_that_is_alive_is_not_pushed_aside(tmp_path: Path) -> None:
+def test_a_loop_that_is_alive_and_a_port_that_is_taken_are_not_pushed_aside(tmp_path: Path) -> None:
     slow = changed(SIMULATED, "test", watchdog_ms=5000.0)
     with drive(slow, lockstep=False) as there, Session(scenario(), over(there.url, slow), tmp_path / "a") as one:
         one.advance(10)
         with pytest.raises(HardwareError, match="taken by another loop"):
             Session(scenario(), over(there.url), tmp_path / "b")
+        with pytest.raises(HardwareError, match=r"cannot listen at .* it is taken"), drive(port=there.port):
+            pass
 
 
 def test_a_drive_that_is_not_there_is_refused_in_a_sentence(tmp_path: Path) -> None:
@@ -193,15 +195,6 @@ def test_what_is_no_drive_is_refused_in_a_sentence(
 ) -> None:
     with replying(reply) as url, pytest.raises(HardwareError, match=sentence):
         session(tmp_path, url)
-
-
-def test_a_port_that_is_taken_is_refused() -> None:
-    with (
-        drive() as there,
-        pytest.raises(HardwareError, match=r"cannot listen at .* it is taken"),
-        drive(port=there.port),
-    ):
-        pass
 
 
 @pytest.mark.parametrize("url", ["udp://127.0.0.1", "udp://:4020", "udp://127.0.0.1:x", "tcp://127.0.0.1:4020"])

@@ -2,7 +2,6 @@
 
 import re
 import resource
-import socket
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
@@ -18,11 +17,10 @@ from cosim.data.recording import Recording
 from cosim.hardware import loops, move
 from cosim.hardware.loops import Called, Forked, Threaded, bare_clock
 from cosim.hardware.machine import Machine
-from cosim.hardware.session import Session, run_session
+from cosim.hardware.session import Session
 from cosim.hardware.story import Story
 from cosim.hardware.structures import LIMITS as MANY
 from cosim.hardware.structures import CSession
-from cosim.hardware.udp import reach
 from cosim.hardware.words import ASK_ENABLE, ASK_ESTOP, ASK_QUICK_STOP, ASK_RESET, LIMITS
 from cosim.support.errors import HardwareError
 
@@ -143,24 +141,6 @@ def test_a_limit_may_be_made_smaller_down_to_nothing(value: float, good: bool) -
     assert one._session.change == 0
 
 
-@pytest.mark.parametrize("breaks", [False, True])
-def test_a_whole_session_says_how_it_ended(breaks: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    rises = up(3)
-
-    def follow(one: Any) -> None:
-        rises(one)
-        if one._session.request == ASK_QUICK_STOP:
-            one.axis.state, one.axis.running = 1, 0
-        elif breaks and one._session.tick == 100:
-            one.axis.state, one.axis.running, one.axis.faults = 7, 0, 0b100
-
-    monkeypatch.setattr(Session, "statistics", property(lambda _: {"cycles": 1}))
-    told = run_session(counting(follow, setpoints=500))
-    assert (told["completed"], told["cycles"], told["torque"]) == (not breaks, 1, 0.0)
-    assert (told["state"], told["faults"]) == (("fault", ["frame_lost"]) if breaks else ("switch on disabled", []))
-    assert told["seconds"] >= 0
-
-
 @pytest.mark.parametrize(
     ("fast", "python", "kind"), [(True, True, Called), (False, True, Threaded), (False, False, Forked)]
 )
@@ -271,15 +251,6 @@ def test_a_clock_sleeps_between_its_edges_and_is_not_early() -> None:
     assert edges + late >= 20
     assert monotonic() - began >= 0.01 * 19
     assert slept >= edges / 2
-
-
-def test_a_socket_waits_a_fifth_of_a_second_and_talks_to_one_place_only() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
-        there.bind(("127.0.0.1", 0))
-        one = reach(f"udp://127.0.0.1:{there.getsockname()[1]}")
-        assert one.gettimeout() == 0.2
-        assert one.getpeername() == there.getsockname()
-        one.close()
 
 
 STORY: dict[str, Any] = {
