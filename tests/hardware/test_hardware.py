@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario, session, simulated
+from on_hardware import MOVING, SCENARIO, SIMULATED, invoke, recorded, scenario, session, simulated
 
 from cosim.data.recording import Recording
 from cosim.hardware.blackbox import unwrapped
@@ -40,8 +40,7 @@ def test_commands_are_those_of_the_co_simulation_bit_for_bit_also_where_the_enco
 def test_an_impulse_takes_as_many_ticks_to_the_motor_and_to_the_encoder_on_both(tmp_path: Path) -> None:
     sine = 'kind = "sine"\nfrequency = 1.0\nmax_velocity = 2e-3\nsmooth_start = 0.1'
     steps = 'kind = "steps"\ntimes = [0.05, 0.0501]\nvalues = [1e-4, 0.0]\nunit = "rad"'
-    wires = SCENARIO[SCENARIO.index('[[connections]]\nfrom = "reference.velocity"') : SCENARIO.index("[record]")]
-    what = scenario((sine, steps), (wires, ""), ("reference.position", "reference.value"))
+    what = scenario((sine, steps), (MOVING, ""), ("reference.position", "reference.value"))
     at = 500
     with session(tmp_path, what=what) as one:
         one.enable()
@@ -106,7 +105,7 @@ def test_a_limit_is_never_loosened_while_enabled(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (("quantum = 1.4629180792671596e-9", ""), "one wire must have the quantum of the encoder, and 0 have one"),
+        ((", quantum = 1.4629180792671596e-9", ""), "one wire must have the quantum of the encoder, and 0 have one"),
         (("step = 1e-4", "step = 2e-4"), '"controller" is sampled every 0.0001 s and the loop every 0.0002 s'),
     ],
 )

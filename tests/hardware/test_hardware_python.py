@@ -90,7 +90,7 @@ def test_orders_reach_an_adapter_in_python_and_its_readings_the_loop(tmp_path: P
         log = one.transport.one.log  # type: ignore[attr-defined]
         done = run_session(one)
     assert (done["completed"], "adapter_error" in done) == (True, False)
-    assert one.transport.one.closed  # type: ignore[attr-defined]
+    assert (one.transport.python, one.transport.one.closed) == (True, True)  # type: ignore[attr-defined]
     found = recorded(tmp_path)
     orders = np.array(log)
     assert np.array_equal(orders[1:-1, 2], found["machine.order"][:-1]), "an order acts one tick after its sample"

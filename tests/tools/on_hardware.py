@@ -18,10 +18,18 @@ from cosim.models.cache import with_fmus
 from cosim.system.scenario import Scenario, parse_scenario
 from cosim.system.wire import Record
 
-SCENARIO = """
+MOVING = """  { from = "reference.velocity", to = "controller.v_d" },
+  { from = "reference.acceleration", to = "controller.a_d" },
+"""
+SCENARIO = f"""
 name = "hardware"
 step = 1e-4
 stop = 0.4
+connections = [
+  {{ from = "controller.tau", to = "mount.tau" }},
+  {{ from = "mount.q", to = "controller.q", quantum = 1.4629180792671596e-9 }},
+  {{ from = "reference.position", to = "controller.q_d" }},
+{MOVING}]
 [components.mount]
 card = "paper_mount"
 part = "plant"
@@ -33,24 +41,8 @@ kind = "sine"
 frequency = 1.0
 max_velocity = 2e-3
 smooth_start = 0.1
-[[connections]]
-from = "controller.tau"
-to = "mount.tau"
-[[connections]]
-from = "mount.q"
-to = "controller.q"
-quantum = 1.4629180792671596e-9
-[[connections]]
-from = "reference.position"
-to = "controller.q_d"
-[[connections]]
-from = "reference.velocity"
-to = "controller.v_d"
-[[connections]]
-from = "reference.acceleration"
-to = "controller.a_d"
 [record]
-signals = { tau = "mount.tau", q = "controller.q" }
+signals = {{ tau = "mount.tau", q = "controller.q" }}
 """
 SIMULATED = read_machine("simulated")
 AT = 0.2
