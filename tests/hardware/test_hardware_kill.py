@@ -6,8 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 from mortal import mortal
 from on_hardware import SCENARIO, recorded
 from over_udp import PATIENT, drive, session
+from waiting import until
 
 from cosim.data.recording import Recording
 from cosim.hardware.replay import replay
@@ -44,13 +44,6 @@ def box_of(folder: Path) -> Recording:
     return found
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 120.0) -> None:
-    last = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < last, "it did not happen in time"
-        time.sleep(0.001)
-
-
 def silence_when_the_loop_is_killed(folder: Path) -> float:
     """Kill the loop of a session in operation: the drive lets go. Seconds of silence until then; 0: it had before."""
     with drive(PATIENT, lockstep=False) as there, session(folder, there.url, PATIENT, LONG, fast=False) as one:
@@ -59,7 +52,7 @@ def silence_when_the_loop_is_killed(folder: Path) -> float:
         os.kill(one.loop.process, signal.SIGKILL)
         with pytest.raises(HardwareError, match="ended by signal SIGKILL; the drive's watchdog takes the torque away"):
             one.advance(10_000)
-        wait_for(lambda: there.drive.held == 0)
+        until(lambda: there.drive.held == 0)
         assert there.drive.state == STATES.index("fault") or "deadline" in one.status.faults, "this computer was late"
         tripped = there.virtual.trips > trips
         assert not tripped or there.virtual.taken != 0
@@ -121,7 +114,7 @@ def faults_when_python_is_killed(folder: Path) -> set[str]:
         with spawned("-c", code) as process:
             loop = int(line_of(process))
         try:
-            wait_for(lambda: not Path(f"/proc/{loop}").exists())
+            until(lambda: not Path(f"/proc/{loop}").exists())
         except AssertionError:
             os.kill(loop, signal.SIGKILL)
             raise

@@ -1,10 +1,9 @@
 """A simulated mount behind its server, and ASCOM's own client of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import radians
-from time import monotonic, sleep
 
 from cosim.models.cache import with_fmus
 from cosim.system.scenario import read_scenario
@@ -22,10 +21,3 @@ def simulated() -> Iterator[Telescope]:
     """A telescope of the shipped mount that moves quickly, twenty times as fast as the clock."""
     with SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=20.0) as mount:
         yield Telescope(Pointing(mount, radians(9.0), BEGUN))
-
-
-def until(done: Callable[[], bool], seconds: float = 20.0) -> None:
-    last = monotonic() + seconds
-    while not done():
-        assert monotonic() < last
-        sleep(0.01)

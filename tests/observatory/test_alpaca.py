@@ -16,10 +16,11 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
-from alpaca_mount import ARCSEC, simulated, until
+from alpaca_mount import ARCSEC, simulated
 from alpaca_rules import BASE
 from mortal import mortal
 from test_alpaca_rules import ask
+from waiting import until
 
 from cosim.data.recording import Recording
 from cosim.models.cache import with_fmus
@@ -34,7 +35,6 @@ from cosim_observatory.sky import equatorial, horizontal, sidereal_time
 from cosim_observatory.telescope import HOURS, TURN, Telescope, _hours
 
 PATIENCE = 300.0
-"""Seconds after which what does not happen is an error; what is waited for is always a condition."""
 
 
 @pytest.fixture(scope="module")

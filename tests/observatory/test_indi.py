@@ -8,8 +8,9 @@ from contextlib import closing
 from time import sleep
 
 import pytest
-from alpaca_mount import ARCSEC, simulated, until
+from alpaca_mount import ARCSEC, simulated
 from mortal import mortal
+from waiting import until
 
 from cosim.support.errors import OutputError
 from cosim_observatory.indi import CLIENTS, IndiServer

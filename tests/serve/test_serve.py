@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 from mortal import mortal
-from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording, until
+from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording
 from serving import state as state_of
 from starlette.testclient import TestClient
+from waiting import until
 
 from cosim.support.errors import InputError, OutputError
 from cosim.support.lock import claimed

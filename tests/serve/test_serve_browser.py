@@ -15,8 +15,9 @@ import pytest
 import serve_work
 from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
 from mortal import mortal
-from serving import CARD, HERE, TOKEN, client_of, desk_at, done, listened, recording, until  # skips without [serve]
+from serving import CARD, HERE, TOKEN, client_of, desk_at, done, listened, recording  # skips without [serve]
 from serving import ready as draft
+from waiting import until
 
 from cosim_serve.desk import Desk
 

@@ -13,8 +13,9 @@ from typing import Any
 
 import pytest
 import serve_work
-from serving import act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, until
+from serving import act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording
 from serving import state as state_of
+from waiting import until
 
 from cosim.support.errors import InputError
 from cosim_serve import connection

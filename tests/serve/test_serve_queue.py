@@ -13,9 +13,10 @@ import pytest
 import serve_work
 from report_example import diagnosis
 from serve_work import NOTE
-from serving import CARD, act, alive, client_of, desk_at, done, id_of, kept, new, put, ready, recording, until
+from serving import CARD, act, alive, client_of, desk_at, done, id_of, kept, new, put, ready, recording
 from serving import state as state_of
 from starlette.testclient import TestClient
+from waiting import until
 
 from cosim_serve import comparison
 from cosim_serve.chart import HEIGHT, LEFT, WIDTH, chart, ticks

@@ -4,7 +4,6 @@ import atexit
 import http.client
 import os
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import httpx2
 import numpy as np
 import pytest
 import serve_work
+from waiting import until
 
 pytest.importorskip("starlette", reason="the extra [serve] is not installed")
 pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
@@ -72,13 +72,6 @@ def ready(client: TestClient, *names: str) -> str:
 
 def id_of(job: str) -> str:
     return job.rpartition("/")[2]
-
-
-def until(true: Callable[[], Any], seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, "it did not come in time"
-        time.sleep(0.02)
 
 
 def state(desk: Desk, job: str) -> Job:
