@@ -241,12 +241,6 @@ def test_each_fault_of_the_drive_is_found_and_ends_in_fault_without_torque(
     assert replay(found).identical
 
 
-@pytest.mark.parametrize("kind", ["lost", "stale"])
-def test_what_is_short_is_survived(tmp_path: Path, kind: str) -> None:
-    with session(tmp_path, machine(kind=kind, lasts=2e-4)) as one:
-        assert run_session(one)["completed"]
-
-
 def failing(one: Session) -> None:
     one.transport.drive.failed = 1
 

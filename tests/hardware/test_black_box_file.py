@@ -57,8 +57,7 @@ def damaged(path: Path, places: list[int]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "places", "torn"),
-    [(5, [2], 1), (5, [4], 0), (8, [3], 1), (19, [3], 0), (19, [4], 1), (19, [3, 4, 1], 2)],
+    ("count", "places", "torn"), [(5, [2], 1), (5, [4], 0), (8, [3], 1), (19, [3], 0), (19, [4], 1), (19, [3, 4, 1], 2)]
 )
 def test_torn_is_what_is_missing_among_the_records_but_the_one_that_was_being_written(
     tmp_path: Path, count: int, places: list[int], torn: int

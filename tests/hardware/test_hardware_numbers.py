@@ -100,11 +100,7 @@ def test_an_axis_and_its_session_have_the_numbers_of_their_files(tmp_path: Path)
         assert one._box.box.capacity == 104_000, "the session's 0.4 s and ten more, not the 60 s of the file"
         drive = one.transport.drive  # type: ignore[attr-defined]
         assert (drive.watchdog, drive.heads, drive.eccentricity) == (20, 4, 1e-5)
-        assert (drive.torque, drive.slew, drive.speed) == (
-            given.limits.torque,
-            given.limits.slew,
-            given.limits.speed,
-        )
+        assert (drive.torque, drive.slew, drive.speed) == (given.limits.torque, given.limits.slew, given.limits.speed)
         one.advance(7)
         own.late, own.waited, own.worst = 2, 3, 4500
         told = one.statistics

@@ -94,11 +94,7 @@ def test_many_connections_that_say_nothing_do_not_silence_the_page(
 
 @pytest.mark.parametrize(
     ("said", "part"),
-    [
-        ("", b"X: y\r\n"),
-        ("Transfer-Encoding: chunked\n\n", b"1\r\nx\r\n"),
-        ("Content-Length: 1000000\n\n", b"x"),
-    ],
+    [("", b"X: y\r\n"), ("Transfer-Encoding: chunked\n\n", b"1\r\nx\r\n"), ("Content-Length: 1000000\n\n", b"x")],
     ids=["a head", "chunks", "a body of stated size"],
 )
 def test_what_does_not_get_on_is_ended_and_leaves_nothing(

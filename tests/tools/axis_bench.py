@@ -32,7 +32,7 @@ class Bench:
         self.status = 0
         self.restored = 0
         self._input, self._output = (c_double * 2)(), (c_double * 1)()
-        calls = (_SET(self._set), _SET(self._get), _STEP(self._step), _SAVE(lambda *_: 0), _RESTORE(self._restore))
+        calls = (_SET(lambda *_: 0), _SET(self._get), _STEP(self._step), _SAVE(lambda *_: 0), _RESTORE(self._restore))
         self._kept = (calls, (c_uint32 * 2)())
         names = ("set", "get", "step", "save", "restore")
         part = CPart(version=2, inputs=2, outputs=1, **dict(zip(names, map(_address, calls), strict=True)))
@@ -48,10 +48,6 @@ class Bench:
         assert library().hardware_ready(self.axis)
         self.tick = 0
         self.counts = 0
-
-    def _set(self, _: Any, __: Any, count: int, values: Any) -> int:
-        assert count == 2
-        return 0
 
     def _get(self, _: Any, __: Any, count: int, values: Any) -> int:
         values[0] = self.command(self._input[0])

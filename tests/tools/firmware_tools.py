@@ -141,9 +141,3 @@ def need(target: str) -> None:
     """Skip a test where programs for a target cannot run."""
     if target == "cortex-a9" and missing_emulator():
         pytest.skip(missing_emulator())
-
-
-def emulator_version() -> str:
-    """The emulator and its version, in the words of its own first line."""
-    said = subprocess.run([EMULATOR, "--version"], capture_output=True, text=True, check=True).stdout
-    return " ".join(said.split()[:3])
