@@ -48,7 +48,7 @@ GROUPS = {
     "system": ("cosim/system/**/*.py",),
     "master": ("cosim/master/*.py",),
     "loop": ("cosim/master/loop/[!b]*.py", "cosim/master/loop/*.c"),
-    "data": ("cosim/data/**/*.py", "cosim_bags/*.py", "cosim/support/*.py"),
+    "data": ("cosim/data/**/*.py", "cosim_readers/*.py", "cosim/support/*.py"),
     "estimation": ("cosim/estimation/**/*.py", "cosim/estimation/**/*.c"),
     "decide": tuple(f"cosim/diagnosis/{one}/*.py" for one in ("decide", "evidence", "search", "measure")),
     "effects": (

@@ -1,14 +1,14 @@
 """File formats of recordings: bytes to named columns, nothing judged yet.
 
-Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, MDF4, and what is plugged
-in (`cosim.support.plugins`): MCAP and bags of ROS 1 and 2. Units come along where a file states them; see `Columns`.
+Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, and what is plugged in
+(`cosim.support.plugins`): MDF4, MCAP and bags of ROS 1 and 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from cosim.data.binary import apart, hdf5, matlab, mdf, numpy_files, parquet
+from cosim.data.binary import apart, hdf5, matlab, numpy_files, parquet
 from cosim.data.columns import Columns
 from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
@@ -135,7 +135,6 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".mat": matlab.read,
     ".h5": hdf5.read,
     ".hdf5": hdf5.read,
-    ".mf4": mdf.read,
     ".txt": read_text,
     ".txt.gz": read_text,
     ".tsv": read_text,
@@ -144,5 +143,5 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".asc": read_text,
     ".lvm": read_text,
 }
-_APART = (hdf5.read, matlab.read, mdf.read)
+_APART = (hdf5.read, matlab.read)
 """Those by libraries that may crash or hang on a damaged file, as may what is plugged in."""

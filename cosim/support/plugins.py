@@ -8,6 +8,8 @@
     cosim.identifiers  "model": what `cosim.identify` calls for an FMU or a system in the place of a card
     cosim.readers      "bag": reads files of the suffix .bag; a function of a path to `cosim.data.columns.Columns`,
                        run in a process of its own with limits of memory and time
+    cosim.importers    a module that reads what a machine's tool exports as text: `recognises(lines)` its first lines,
+                       `read(path, whole, lines)` gives `Columns`
     cosim.formulas     a function that looks for a closed form in the place of a learned table, see
                        `cosim.diagnosis.terms.closed_form`
     cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
@@ -22,7 +24,8 @@ from typing import Any
 from cosim.support.errors import PlugInError
 
 EXPORTS, HANDLES, IDENTIFIERS = "cosim.exports", "cosim.handles", "cosim.identifiers"
-READERS, VERBS, TRANSPORTS = "cosim.readers", "cosim.verbs", "cosim.transports"
+IMPORTERS, READERS = "cosim.importers", "cosim.readers"
+VERBS, TRANSPORTS = "cosim.verbs", "cosim.transports"
 
 
 @cache

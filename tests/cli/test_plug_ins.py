@@ -20,14 +20,16 @@ def hello(name: str, loud: bool = False) -> None:
 def wave() -> None:
     """Wave."""
     print("waved")
-def read(path):
+def recognises(lines):
+    return lines[0].startswith("log of ours")
+def read(path, whole=b"", lines=()):
     """Read a log of our own: a row a line."""
     import os
     import numpy as np
     from cosim.data.columns import Columns
     if path.read_bytes().startswith(b"crash"):
         os.abort()
-    t, tau, q = np.loadtxt(path).T
+    t, tau, q = np.loadtxt(path, skiprows=int(len(whole) > 0)).T
     return Columns({"t": t, "tau": tau, "q": q}, units={"q": "deg"})
 '''
 POINTS = """[cosim.verbs]
@@ -38,6 +40,8 @@ run = hello_of_mine
 [cosim.handles]
 greet = hello_of_mine:hello
 run = hello_of_mine:hello
+[cosim.importers]
+ours = hello_of_mine
 [cosim.readers]
 ours = hello_of_mine:read
 csv = hello_of_mine:read
@@ -106,8 +110,11 @@ def test_a_file_of_its_own_kind_is_read_and_one_that_crashes_its_reader_is_a_sen
     for name in ("one.ours", "one.csv"):
         (site / name).write_text(rows, "utf-8")
     (site / "two.ours").write_text("crash", "utf-8")
+    (site / "two.csv").write_text(f"log of ours\n{rows}", "utf-8")
     code = "import cosim, sys; one = cosim.read(sys.argv[1]); print(len(one['t']), round(one['q'].max(), 9))"
-    assert python(site, "-c", code, "one.ours").stdout == f"400 {round(89 * pi / 180, 9)}\n"
+    for name in ("one.ours", "two.csv"):
+        done = python(site, "-c", code, name)
+        assert done.stdout == f"400 {round(89 * pi / 180, 9)}\n", done.stderr
     assert "--columns t=#1" in python(site, "-c", code, "one.csv").stderr  # .csv stays ours, which asks for names
     crashed = python(site, "-c", code, "two.ours").stderr.splitlines()[-1]
     assert "two.ours is damaged: the library that reads .ours files crashed on it" in crashed

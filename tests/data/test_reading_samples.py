@@ -89,7 +89,7 @@ def _joint_states() -> list[dict[str, Any]]:
 
 def mcap(path: Path) -> None:
     writer = pytest.importorskip("mcap_ros2.writer")
-    from cosim_bags.rosbag import JOINT_STATE
+    from cosim_readers.rosbag import JOINT_STATE
 
     with path.open("wb") as file:
         out = writer.Writer(file)

@@ -14,7 +14,7 @@ from cosim.data.columns import Request
 from cosim.data.one_run import rows_of_one
 from cosim.data.recording import REQUIRED, Recording
 from cosim.support.errors import UndecidedError
-from cosim_bags.messages import Message, columns_of
+from cosim_readers.messages import Message, columns_of
 
 TA, TQ = np.arange(2000) / 1000, 3e-4 + np.arange(1000) / 500
 TAU, Q = np.cos(9 * TA), 0.1 * np.sin(9 * TQ)

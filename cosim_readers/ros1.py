@@ -18,7 +18,7 @@ import numpy as np
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_time, check_unpacked, short
 from cosim.support.errors import RecordingError
-from cosim_bags.messages import Message, columns_of
+from cosim_readers.messages import Message, columns_of
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, CHUNK, CONNECTION = 2, 5, 7

@@ -15,7 +15,7 @@ from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import allowance, check_text, is_late, over_time
 from cosim.support.errors import RecordingError
-from cosim_bags.messages import Message, columns_of
+from cosim_readers.messages import Message, columns_of
 
 LINE = "=" * 80
 TABLES = ("topics", "messages", "message_definitions")

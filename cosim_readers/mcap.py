@@ -8,7 +8,7 @@ from typing import Any
 from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_unpacked, short
-from cosim_bags.messages import Message, columns_of
+from cosim_readers.messages import Message, columns_of
 
 
 def read(path: Path) -> Columns:
