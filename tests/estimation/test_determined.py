@@ -25,7 +25,7 @@ SPEEDS = (0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.4, -0.4)
 
 def mount(friction: object = None, inertia: float = 45.0, motion: str = "rotary") -> Mount:
     law = friction or Coulomb(Fc=4.0, sigma2=30.0)
-    return Mount(name="axis", axis=Axis(inertia=inertia), friction=law, motion=motion)  # type: ignore[arg-type]
+    return Mount(name="axis", axis=Axis(inertia=inertia), friction=law, motion=motion)
 
 
 def steady(seed: int = 1, speeds: tuple[float, ...] = SPEEDS, noise: float = 1e-7) -> Recording:

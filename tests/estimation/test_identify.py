@@ -79,15 +79,13 @@ def test_inputs_that_a_recording_lacks_are_at_their_start() -> None:
     np.testing.assert_allclose(q, 0.75 * (t - 0.5 * (1 - np.exp(-2 * t))), atol=1e-9)
 
 
-def test_output_error_recovers_the_bristles_within_one_per_cent_from_starts_a_factor_of_two_off(
-    recording: Recording,
-) -> None:
+def test_output_error_recovers_the_bristles_within_one_per_cent_from_starts_a_factor_of_two_off(recording):
     true = the_card().friction
     wrong = half(the_card(), "sigma0", "sigma1", "Fc", "Fs")
     found = identify([recording], wrong, Options(free=("sigma0", "sigma1", "sigma2", "Fc", "Fs", "Vs"), starts=1))
     assert found.best is not None
-    assert found.card.friction.sigma0 == pytest.approx(true.sigma0, rel=0.01)  # type: ignore[attr-defined]
-    assert found.card.friction.sigma1 == pytest.approx(true.sigma1, rel=0.01)  # type: ignore[attr-defined]
+    assert found.card.friction.sigma0 == pytest.approx(true.sigma0, rel=0.01)
+    assert found.card.friction.sigma1 == pytest.approx(true.sigma1, rel=0.01)
     truth = np.array([getattr(true, name.split(".")[1]) for name in found.best.names])
     assert np.all(np.abs(found.best.values - truth) < 5 * found.best.standard_errors)
 
@@ -122,9 +120,7 @@ def test_a_start_is_looked_at_and_only_the_best_is_settled() -> None:
     assert best.evaluations > min(one.evaluations for one in looked)
 
 
-def test_the_linear_presliding_fit_is_biased_as_published_and_the_direct_one_is_not_also_of_damping_that_fades(
-    step: Recording,
-) -> None:
+def test_the_linear_presliding_fit_is_biased_as_published_and_the_direct_one_is_not_also_of_damping_that_fades(step):
     card, true = the_card(**POSITIVE), [POSITIVE["sigma0"], POSITIVE["sigma1"]]
     found = presliding(half(card, "sigma0", "sigma1"), step)
     assert found.linear.values / true == pytest.approx([0.56, 3.5], rel=0.02)
@@ -184,17 +180,15 @@ def test_names_may_leave_out_their_prefix_unknown_ones_are_refused_and_what_a_st
     assert free_names(card, ("Fc", "inertia")) == ("friction.Fc", "axis.inertia")
     with pytest.raises(InputError, match=r'"Fd" is no parameter .* friction\.Fc'):
         free_names(card, ("Fd",))
-    assert with_numbers(card, {"friction.Fc": 2.0, "friction.Fc.positive": 3.0}).friction.Fc == 2.0  # type: ignore[attr-defined]
+    assert with_numbers(card, {"friction.Fc": 2.0, "friction.Fc.positive": 3.0}).friction.Fc == 2.0
 
 
-def test_the_summary_warns_of_numbers_that_depend_on_each_other_and_says_how_well_the_curve_is_known(
-    quasi_static: Recording,
-) -> None:
+def test_the_summary_warns_of_numbers_that_depend_on_each_other_and_says_how_well_the_curve_is_known(quasi_static):
     card = the_card(**POSITIVE)
     found = identify([quasi_static], card, Options(free=("sigma0",), starts=1))
     text = summary(found, card)
     assert "Mind, positive: these numbers cannot be told apart here, their curve can: within 0.00" in text
-    assert any("correlate" in warning for warning in found.map.fits["positive"].warnings)  # type: ignore[union-attr]
+    assert any("correlate" in warning for warning in found.map.fits["positive"].warnings)
 
 
 def test_the_verb_writes_card_numbers_and_pictures(recording: Recording, step: Recording, tmp_path: Path) -> None:
@@ -300,7 +294,7 @@ def test_one_speed_leaves_a_number_at_the_cards_and_prints_none_that_its_error_s
     assert len([name for name in found.kept if name.startswith("friction.")]) >= 3
     new, old = ({one.name: one.start for one in c.plant().parameters()} for c in (found.card, card))
     assert all(new[name] == old[name] for name in found.kept)
-    assert float(found.card.friction.level(0.2) + found.card.friction.viscous(0.2)) == pytest.approx(4.0, rel=0.05)  # type: ignore[arg-type]
+    assert float(found.card.friction.level(0.2) + found.card.friction.viscous(0.2)) == pytest.approx(4.0, rel=0.05)
     text = summary(found, card)
     assert "not determined" in text
     assert not re.search(r"\de[+-]\d", text)
@@ -323,8 +317,8 @@ def test_repeated_readings_are_taken_at_their_own_rate(column: str) -> None:
     table["tau"] = table["tau"] + random
     given = Recording("held", table)
     found = identify([given], card_of(Coulomb(Fc=5.0, sigma2=3.0)), Options(free=("Fc", "sigma2")))
-    assert found.card.friction.sigma2 == pytest.approx(8.0, rel=0.1)  # type: ignore[attr-defined]
-    assert found.card.friction.Fc == pytest.approx(2.0, rel=0.1)  # type: ignore[attr-defined]
+    assert found.card.friction.sigma2 == pytest.approx(8.0, rel=0.1)
+    assert found.card.friction.Fc == pytest.approx(2.0, rel=0.1)
 
 
 def test_a_set_point_that_is_repeated_is_as_smooth_as_it_was() -> None:

@@ -1,7 +1,7 @@
 """What a fit looks at: nothing twice, torque alone after a step that it takes back; and the prior beside it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +16,8 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.stages import margin, stage
 from cosim.estimation import fit as fitting
 from cosim.estimation import problem as problems
+from cosim.estimation import tape_cache
+from cosim.estimation.equations import Equations
 from cosim.estimation.fit import Fit, fit, free_parameters
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.least_squares import ENOUGH, least_squares, of_jacobian
@@ -228,9 +230,7 @@ def compared(zero: float) -> tuple[dict[str, float], float]:
 
 
 @pytest.mark.parametrize("zero", [0.0, 0.3, -2.0])
-def test_two_effects_that_are_one_here_are_not_told_apart_by_their_priors_wherever_the_encoder_has_its_zero(
-    zero: float,
-) -> None:
+def test_two_effects_that_are_one_here_are_not_told_apart_by_their_priors_wherever_the_encoder_has_its_zero(zero):
     evidence, ahead = compared(zero)
     assert min(evidence["cable_wrap"], evidence["gravity_unbalance"]) > 100
     assert abs(ahead) < 3.5
@@ -260,3 +260,73 @@ def test_a_number_may_be_off_by_its_size_a_shape_of_the_law_by_a_tenth(name: str
     mount = replace(AXIS, friction=Stribeck(Fc=1.1, Fs=1.5, Vs=0.02, delta=2.0, sigma2=0.3))
     found: Any = SimpleNamespace(mount=mount, free=(name,), values=(value,))
     assert trust(found, 0.4) == pytest.approx([trusted])
+
+
+# Tapes of structures are derived once and found on the disk from then on, and a cache that fails is none.
+
+
+RIPPLED = replace(MOUNT, effects=(Cogging(cycles_per_rev=12, amplitude=0.3),))
+FREE = ("friction.Fc", "axis.inertia")
+
+
+@pytest.fixture
+def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    tape_cache._folder.cache_clear()
+    yield tmp_path / "cache"
+    tape_cache._folder.cache_clear()
+
+
+def evaluated(mount: Mount = RIPPLED) -> list[np.ndarray]:
+    """Torque and state of a structure at some rows, from expressions that are not in memory."""
+    equations = Equations(mount, FREE, ("a structure", *map(type, mount.components().values())))
+    columns = [np.linspace(0, 1, 50) + k for k in range(9)]
+    numbers = np.array([variable.start for variable in mount.parameters()])
+    return [
+        equations.torque(columns[:6], numbers),
+        *(one.rows([*columns, columns[0]], numbers) for one in equations._affine),
+    ]
+
+
+def test_what_is_on_the_disk_gives_the_same_bits(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = evaluated()
+    files = {path: path.stat().st_mtime_ns for path in folder.rglob("*.tape")}
+    assert files
+    monkeypatch.setattr(Equations, "_symbols", property(lambda _: pytest.fail("it was derived again")))
+    assert all(np.array_equal(*both) for both in zip(first, evaluated(), strict=True))
+    assert files == {path: path.stat().st_mtime_ns for path in folder.rglob("*.tape")}
+
+
+@pytest.mark.parametrize("damage", [b"", b"no tape", b"\xe9\x00\x00"])
+def test_a_damaged_file_is_made_again(folder: Path, damage: bytes) -> None:
+    first = evaluated()
+    for path in folder.rglob("*.tape"):
+        path.write_bytes(damage)
+    assert all(np.array_equal(*both) for both in zip(first, evaluated(), strict=True))
+    assert all(path.read_bytes() != damage for path in folder.rglob("*.tape"))
+
+
+def test_a_folder_with_too_many_begins_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = evaluated()
+    old = sorted(folder.rglob("*.tape"))
+    for path in old:
+        path.rename(path.with_stem(f"another {path.stem}"))
+    tape_cache._folder.cache_clear()
+    monkeypatch.setattr(tape_cache, "MOST", 1)
+    assert all(np.array_equal(*both) for both in zip(first, evaluated(), strict=True))
+    assert sorted(folder.rglob("*.tape")) == old
+
+
+def test_a_folder_that_cannot_be_made_is_done_without(folder: Path) -> None:
+    folder.write_text("a file is in its place", "utf-8")
+    assert np.isfinite(evaluated()[0]).all()
+
+
+@dataclass(frozen=True)
+class OwnRipple(Cogging):
+    """An effect from a file of the user, whose equations may change."""
+
+
+def test_an_effect_of_the_users_own_is_not_stored(folder: Path) -> None:
+    evaluated(replace(MOUNT, effects=(OwnRipple(cycles_per_rev=12, amplitude=0.3),)))
+    assert not list(folder.rglob("*.tape"))

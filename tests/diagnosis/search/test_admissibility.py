@@ -18,7 +18,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search import admissibility
-from cosim.diagnosis.search.admissibility import _way_back, in_time, is_degenerate, name_rules, needs_turns
+from cosim.diagnosis.search.admissibility import in_time, is_degenerate, name_rules, needs_turns
 from cosim.diagnosis.search.commanded import is_asked_for
 from cosim.diagnosis.search.stages import admission, refitted, weighed
 from cosim.estimation.fit import Fit
@@ -73,13 +73,11 @@ def to_and_fro(*reach: float) -> Motion:
 
 
 @pytest.mark.parametrize(("back", "needed"), [(0.29, False), (0.3, False), (0.31, True)])
-def test_friction_is_told_by_the_longest_way_back_of_any_recording(
-    back: float, needed: bool, declared: Declared
-) -> None:
+def test_friction_is_told_by_the_longest_way_back_of_any_recording(back, needed, declared):
     declared(back=back)
     down = Motion({"v": [np.ones(6)], "q": [-one for one in to_and_fro(0.3).columns["q"]]})
     for motion in (to_and_fro(0.3, 0.1), to_and_fro(0.1, 0.3), down):
-        assert needs_turns(EFFECT, None, motion) is needed  # type: ignore[arg-type]
+        assert needs_turns(EFFECT, None, motion) is needed
 
 
 @pytest.mark.parametrize(
@@ -94,9 +92,7 @@ def test_friction_is_told_by_the_longest_way_back_of_any_recording(
         (EFFECT, {"back": 0.5}, False, False),
     ],
 )
-def test_an_effect_is_admissible_if_nothing_speaks_against_it(
-    effect: Any, said: dict[str, Any], degenerate: bool, admissible: bool, declared: Declared
-) -> None:
+def test_an_effect_is_admissible_if_nothing_speaks_against_it(effect, said, degenerate, admissible, declared):
     declared(**said)
     problem: Any = SimpleNamespace(prepared=to_and_fro(0.3))
     one: Any = SimpleNamespace(effect=effect, fit=SimpleNamespace(mount=SimpleNamespace(motion="rotary")))
@@ -123,9 +119,7 @@ ONE_ROW = replace_at(0.1 * STEPS, 2, 1e3)
         pytest.param(ONE_ROW, {"weight": replace_at(np.ones(8), 2, 0.0)}, True, id="in a row without weight"),
     ],
 )
-def test_timing_is_told_where_half_of_the_torques_changes_are_explained(
-    residual: Array, more: dict[str, Any], told: bool, declared: Declared
-) -> None:
+def test_timing_is_told_where_half_of_the_torques_changes_are_explained(residual, more, told, declared):
     declared(timing=more.get("timing", True))
     motion = Motion({"v": [np.ones(4)] * 2, "tau": [STEPS[:4], STEPS[4:]]}, more.get("asked", []))
     problem: Any = SimpleNamespace(prepared=motion, weight=more.get("weight", np.ones(8)))
@@ -175,25 +169,12 @@ def recordings(noise: float, asked: float, spring: bool) -> list[Recording]:
         pytest.param(5.0, 0.0, False, ("t", "q", "tau"), True, id="without a set point nobody can be asked"),
     ],
 )
-def test_a_spring_is_asked_for_by_the_set_point(
-    noise: float, asked: float, spring: bool, columns: tuple[str, ...], told: bool
-) -> None:
+def test_a_spring_is_asked_for_by_the_set_point(noise, asked, spring, columns, told):
     made = [Recording(one.name, {n: one.table[n] for n in columns}) for one in recordings(noise, asked, spring)]
     problem = posed(MOUNT, made, 8.0)
     base = problem.fit(MOUNT, 25)
     found = problem.fit(replace(base.mount, effects=(SPRING,)), 15)
     assert is_asked_for(Comparison.of(problem, base, POLICY), found, found.mount.effects[-1]) is told
-
-
-def test_where_something_removes_energy() -> None:
-    """Of a motion that turns every 5 s, from each turn on for 60 ms."""
-    t = np.arange(0, SECONDS, DT)
-    swung = Recording("run", {"t": t, "q": np.sin(2 * np.pi * 0.1 * t), "tau": np.zeros_like(t)})
-    problem = posed(MOUNT, [swung], 8.0)
-    left = np.where((problem.prepared.stacked("t") - 2.5) % 5.0 < 0.06, 0.0, 1.0)
-    assert away_from_turns(problem, left, np.ones(len(left))) == 1.0  # a hundredth of the energy says nothing
-    assert away_from_turns(problem, left, np.where(left == 0, 5.0, 1.0)) == pytest.approx(0.0, abs=1e-12)
-    assert away_from_turns(problem, 0 * left, np.ones(len(left))) == pytest.approx(0.94, abs=0.03)
 
 
 def test_what_is_late_about_turns_alone_is_not_named() -> None:
@@ -286,15 +267,6 @@ def test_a_contact_settles_by_less_than_twice_its_level_and_more_than_that_wande
 # What formulas of admissibility are, by hand.
 
 
-@pytest.mark.parametrize(
-    ("q", "back"),
-    [([0.0, 1.0, 2.0], 0.0), ([0.0, 2.0, 1.5, 3.0], 0.5), ([0.0, -2.0, -1.0, -4.0], 1.0), ([1.0, 0.0, 3.0, 1.0], 2.0)],
-)
-def test_the_way_back_is_the_longest_against_the_way_that_a_motion_goes(q: list[float], back: float) -> None:
-    assert _way_back(np.array(q)) == back
-    assert _way_back(-np.array(q)) == back
-
-
 @pytest.mark.parametrize("rows", [9, 10])
 def test_at_rest_counts_from_ten_rows_on_and_only_where_the_law_says_nothing(rows: int) -> None:
     weight = np.concatenate([np.ones(30), np.zeros(rows)])
@@ -304,9 +276,7 @@ def test_at_rest_counts_from_ten_rows_on_and_only_where_the_law_says_nothing(row
 
 
 @pytest.mark.parametrize(("removed", "told"), [(0.019, False), (0.021, True)])
-def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(
-    removed: float, told: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(removed, told, monkeypatch):
     """Of a hundred rows the last half are about turns; all is removed there."""
     far = np.repeat([1.0, 0.0], 50)
     monkeypatch.setattr("cosim.estimation.residuals.far_from_turns", lambda _: far)

@@ -33,7 +33,7 @@ class Played:
     """
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
-        self.patch, self.asked = patch, []  # type: ignore[var-annotated]
+        self.patch, self.asked = patch, []
 
     def __call__(
         self,
@@ -51,11 +51,11 @@ class Played:
     ) -> Examined:
         def stage(comparison: Any, current: Fitted, refits: Any, stands: CandidateFit | None = None) -> Stage:
             self.asked.append((current.names, stands and stands.effect.id))
-            return Stage(current, tuple((beside or {}).get("".join(sorted(current.names)), [])))  # type: ignore[arg-type]
+            return Stage(current, tuple((beside or {}).get("".join(sorted(current.names)), [])))
 
         def weighed(comparison: Any, chosen: Fitted, before: Fitted, effect: Named) -> CandidateFit:
             fit: Any = replace(chosen, count=(counts or {}).get(effect.id, 0))
-            return CandidateFit(effect, fit, worth[effect.id] - before.left, 0.0, gain)  # type: ignore[arg-type]
+            return CandidateFit(effect, fit, worth[effect.id] - before.left, 0.0, gain)
 
         def ahead(_: Any, own: CandidateFit, other: CandidateFit) -> float:
             return own.evidence - other.evidence
@@ -72,7 +72,7 @@ class Played:
             self.patch.setattr(rivals, name, stand_in)
         found: Any = SimpleNamespace(base=fitted("b"), chosen=fitted("b" + names), stages=stages)
         self.patch.setattr(Tables, "policy", policy)
-        return examine(Tables(), found)  # type: ignore[arg-type]
+        return examine(Tables(), found)
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Played:
 
 
 def names_of(found: Examined | Proof) -> str:
-    return found.chosen.names  # type: ignore[attr-defined, no-any-return]
+    return found.chosen.names
 
 
 def test_what_nothing_challenges_stays_with_its_margins(play: Played) -> None:
@@ -92,7 +92,7 @@ def test_what_nothing_challenges_stays_with_its_margins(play: Played) -> None:
     assert [r.effect.id for r in one.rivals] == ["s", "r"], "the best of each kind, the closest first; not itself"
     assert one.margins == {"s": 10.0, "r": 20.0}
     assert one.margin(one.rivals[1]) == 20.0
-    assert one.without.mount.effects == (Named("b"),)  # type: ignore[comparison-overlap]
+    assert one.without.mount.effects == (Named("b"),)
     assert found.last.current is found.chosen
     assert ("b", "x") in play.asked, "an effect that is fitted beside the others is not fitted there again"
 
@@ -135,12 +135,10 @@ UNDECIDED = {"undecided": True}
         pytest.param(("x", 20.0, 0), ("r", 90.0, 0), {"misfits": {"x": 1.0, "r": 2}}, "x", id="it does: not evidence"),
     ],
 )
-def test_a_rival_takes_the_place(
-    own: tuple[str, float, int], rival: tuple[str, float, int], more: dict[str, Any], stands: str, play: Played
-) -> None:
+def test_a_rival_takes_the_place(own, rival, more, stands, play):
     beside = {"b": [candidate("b" + name, worth, count) for name, worth, count in (rival, own)]}
     worth, counts = ({one[0]: one[place] for one in (own, rival)} for place in (1, 2))
-    assert names_of(play(own[0], worth, beside, counts=counts, **more)) == "b" + stands  # type: ignore[arg-type]
+    assert names_of(play(own[0], worth, beside, counts=counts, **more)) == "b" + stands
 
 
 def test_waves_over_position_have_any_number_of_cycles() -> None:
@@ -167,7 +165,7 @@ def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(pla
     assert names_of(stopped) == "brp", "what was found by then stands, what has evidence beside it is not asked for"
     assert [one.effect.id for one in stopped.effects] == ["r", "p"], "each is challenged"
     assert "beside 2 structures" in stopped.ended[0]
-    assert (stopped.base.names, stopped.last.current) == ("b", stopped.chosen)  # type: ignore[attr-defined]
+    assert (stopped.base.names, stopped.last.current) == ("b", stopped.chosen)
 
 
 def test_beside_an_effect_that_explains_little_nothing_is_added(play: Played) -> None:
@@ -181,7 +179,7 @@ def accepted(
     """An effect beside others, and by how many nats its rivals are behind it."""
     others = tuple(candidate(f"b{beside}{one}", evidence - by) for one, by in margins.items())
     own, without = candidate(f"b{beside}{name}", evidence, removes=removes), fitted("b" + beside, left=1.0)
-    return AcceptedEffect((Named(name),), own, without, others, margins, margins)  # type: ignore[arg-type]
+    return AcceptedEffect((Named(name),), own, without, others, margins, margins)
 
 
 def test_margins_are_those_of_the_set_point_where_it_tells_the_two_apart() -> None:
@@ -198,9 +196,9 @@ def test_what_raises_the_error_explains_nothing() -> None:
 
 def test_effects_of_one_kind_are_one_group_shown_by_the_strongest_and_those_of_the_card_in_none(play: Played) -> None:
     waves = tuple(Named("x", amplitude) for amplitude in (0.1, 0.7, 0.3))
-    assert replace(accepted("x"), effects=waves).effect == waves[1]  # type: ignore[arg-type, comparison-overlap]
+    assert replace(accepted("x"), effects=waves).effect == waves[1]
     one = Fitted(Structure((Named("b"), Named("x"), Named("y"), Named("x", 2.0))))
-    groups = grouped(Tables(), one)  # type: ignore[arg-type]
+    groups = grouped(Tables(), one)
     assert [[effect.id for effect in group] for group in groups] == [["x", "x"], ["y"]]
     play("xx", {"x": 50.0})
     assert ("b", None) in play.asked, "of a ripple other multiples are tried once more"
@@ -296,9 +294,7 @@ def ids(effects: tuple[AcceptedEffect, ...]) -> str:
         pytest.param((910.0, 860.0, 927.0), (0.499, 0.04, 0.49), "y", id="hardly any error is left"),
     ],
 )
-def test_effects_stand_by_what_they_predict(
-    nats: tuple[float, ...], errors: tuple[float, ...], stands: str, proven: Prove
-) -> None:
+def test_effects_stand_by_what_they_predict(nats, errors, stands, proven):
     ways = ("x", "y", "xy")
     given = dict(zip(ways, nats, strict=True)), dict(zip(ways, errors, strict=bool(errors)))
     _, proof, standing = proven(given[0], *listed("xy"), errors=given[1])
@@ -312,9 +308,7 @@ def test_effects_are_worth_what_is_lost_without_them(proven: Prove) -> None:
 
 
 @pytest.mark.parametrize(("more", "stands"), [(7.0, "x"), (29.0, "x"), (31.0, "ux")])
-def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(
-    more: float, stands: str, proven: Prove
-) -> None:
+def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(more, stands, proven):
     assert proven({"x": 10.0, "ux": 10.0 + more, "u": more}, *listed("xu"))[2] == stands
 
 
@@ -356,9 +350,7 @@ def test_a_rival_stands_where_the_first_does_not_predict(proven: Prove) -> None:
 
 
 @pytest.mark.parametrize(("behind", "own", "stands"), [(-0.01, 0.0, "y"), (0.0, 0.0, ""), (-0.01, -0.01, "")])
-def test_only_what_training_has_near_it_with_evidence_of_its_own_is_asked(
-    behind: float, own: float, stands: str, proven: Prove
-) -> None:
+def test_only_what_training_has_near_it_with_evidence_of_its_own_is_asked(behind, own, stands, proven):
     refused = accepted("x", y=PROVING.clear + behind)
     refused = replace(refused, rivals=(replace(refused.rivals[0], evidence=PROVING.clear + own),))
     assert proven({"x": -2.0, "y": 8.0}, refused)[2] == stands

@@ -1,8 +1,11 @@
 """One effect beside a fitted base: what is tried of it, in which shape it is fitted, and what it is worth."""
 
-from collections.abc import Sequence
+import os
+import signal
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,11 +20,14 @@ from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence import comparison as evidence
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
 from cosim.diagnosis.measure.law_selection import proposed_law
+from cosim.diagnosis.search import side_by_side
 from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.global_test import Scores, _groups, global_test
 from cosim.diagnosis.search.rivals import refitted_from_here
+from cosim.diagnosis.search.side_by_side import SideBySide
 from cosim.diagnosis.search.stages import (
     CandidateFit,
+    InTurn,
     best_of,
     contest,
     holds_at_rest,
@@ -34,9 +40,11 @@ from cosim.diagnosis.search.stages import (
     weighed,
 )
 from cosim.estimation.fit import Fit, with_values
+from cosim.support.cell import Cell
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.tool import given
 from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect, TorqueOffset
+from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import Coulomb
@@ -52,7 +60,7 @@ def compared(extra: object) -> tuple[Comparison, Fit]:
     for run in (0.0, 2.0):
         q, v, acceleration = swing(t, [(0.5, 0.11, run), (0.1, 0.37, 1.0 + run), (0.02, 0.9, 2.0)])
         noise = 0.002 * rng.standard_normal(len(t))
-        tau = 5 * acceleration + LEVEL * np.sign(v) + v + extra(q, v) + noise  # type: ignore[operator]
+        tau = 5 * acceleration + LEVEL * np.sign(v) + v + extra(q, v) + noise
         recordings.append(Recording(f"run_{run}", {"t": t, "tau": tau, "q": q}))
     mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=LEVEL, sigma2=1.0))
     problem = posed(mount, recordings, 20.0, 0.02)
@@ -131,7 +139,7 @@ def test_a_candidate_without_values_beside_a_structure_is_left_out(monkeypatch: 
     lacking = whole[0].candidate.effect
 
     def without(mount: Mount, tried: Sequence[Candidate], *more: object) -> list[np.ndarray]:
-        columns = columns_of(mount, tried, *more)  # type: ignore[arg-type]
+        columns = columns_of(mount, tried, *more)
         return [np.full_like(c, np.nan) if one.effect == lacking else c for one, c in zip(tried, columns, strict=True)]
 
     monkeypatch.setattr(evidence, "columns_of", without)
@@ -152,9 +160,7 @@ def test_a_spring_does_not_start_from_a_negative_mass() -> None:
     ("at_rest", "evidence", "holds"),
     [(0.9, 100.0, True), (0.89, 100.0, False), (0.9, 99.0, False), (1.0, 500.0, False)],
 )
-def test_what_surely_holds_an_axis_at_rest_need_not_bend_by_what_recordings_show(
-    at_rest: float, evidence: float, holds: bool
-) -> None:
+def test_what_surely_holds_an_axis_at_rest_need_not_bend_by_what_recordings_show(at_rest, evidence, holds):
     """1.0 is that of an effect that gives the model no memory."""
     _, base = compared(lambda q, v: 0 * q)
     found = CandidateFit(Presliding(sigma0=1e9), base, evidence, 0.0, 0.5, at_rest=at_rest)
@@ -219,7 +225,7 @@ def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effec
 def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over() -> None:
     """Friction that falls over all recorded speeds: refitted without a curve, twice its level."""
     comparison, base = compared(lambda _, v: 2.0 * np.exp(-((v / 0.8) ** 2)) * np.sign(v))
-    level = float(base.mount.friction.Fc)  # type: ignore[attr-defined]
+    level = float(base.mount.friction.Fc)
     assert level > 1.9 * LEVEL
     found = refitted(comparison, base, StribeckEffect(Fs=level, Vs=0.01), 1)
     assert isinstance(found.effect, StribeckEffect)
@@ -230,7 +236,7 @@ def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over()
 def test_a_phase_is_told_within_a_turn() -> None:
     comparison, base = compared(lambda q, _: 0.3 * np.cos(11 * q + 1.0))
     far = replace(base.mount, effects=(Cogging(amplitude=0.3, cycles_per_rev=11.0, phase=1.0 + 200 * np.pi),))
-    assert comparison.problem.fit(far, 10).mount.effects[-1].phase == pytest.approx(1.0, abs=0.05)  # type: ignore[attr-defined]
+    assert comparison.problem.fit(far, 10).mount.effects[-1].phase == pytest.approx(1.0, abs=0.05)
 
 
 # Is anything missing at all: the largest score of the catalogue, and what a null would give.
@@ -263,3 +269,93 @@ def test_columns_that_are_nothing_or_known_already_score_nothing() -> None:
     scores._gram = np.array([[0, 0, 0], [0, -1e-17, -1e-17], [0, -1e-17, -1e-17]])
     scores._groups = list(_groups([form, form], columns, 1.0))
     assert np.abs(scores.of(np.ones((50, 3)))).max() < 1
+
+
+# Refits in two processes: the same as in one, whatever happens to the other.
+
+
+@pytest.fixture(scope="module")
+def problem() -> Any:
+    """A comparison, its base, and what is worth a refit; a play among it, which takes longest."""
+    comparison, base = compared(lambda q, _: 0.5 * np.sin(6 * q + 0.3))
+    play = Backlash(gap_rad=0.01, load_share=0.3, load_friction=0.5, load_viscous=0.1)
+    return comparison, base, [*starts(comparison.screen(base), comparison.policy)[:3], (play, 4)]
+
+
+@pytest.fixture(scope="module")
+def alone(problem: Any) -> list[CandidateFit]:
+    """What one process finds."""
+    return InTurn()(*problem)
+
+
+def assert_same(found: list[CandidateFit], expected: list[CandidateFit]) -> None:
+    for one, other in zip(found, expected, strict=True):
+        assert (one.effect, one.fit.mount, one.evidence) == (other.effect, other.fit.mount, other.evidence)
+        assert np.array_equal(one.fit.slopes, other.fit.slopes)
+
+
+def counted(monkeypatch: pytest.MonkeyPatch, before: Callable[[Cell, int], None] = lambda *_: None) -> list[object]:
+    """What the other process was asked for, which this one waits for; something happens to it before that."""
+    asked, call, here, begun = [], Cell.call, side_by_side.refitted, Event()
+
+    def counting(cell: Cell, function: Any, *arguments: Any) -> Any:
+        if function is side_by_side._refitted:
+            before(cell, len(asked))
+            asked.append(arguments[0])
+            begun.set()
+        return call(cell, function, *arguments)
+
+    def patient(*arguments: Any) -> CandidateFit:
+        assert begun.wait(60)
+        return here(*arguments)
+
+    monkeypatch.setattr(Cell, "call", counting)
+    monkeypatch.setattr(side_by_side, "refitted", patient)
+    return asked
+
+
+def test_two_processes_find_what_one_finds(problem, alone, monkeypatch):
+    said: list[str] = []
+    asked = counted(monkeypatch)
+    with SideBySide(said.append) as both:
+        assert_same(both(*problem), alone)
+        assert_same(both(*problem), alone)
+    assert asked
+    assert said
+    assert said[0] == "Backlash (1 of 4)"
+    assert len(asked) + len(said) == 8
+
+
+def test_what_a_process_had_taken_when_it_was_killed_is_done_here(problem, alone, monkeypatch):
+    asked = counted(monkeypatch, lambda cell, _: os.kill(cell.pid, signal.SIGKILL))
+    with SideBySide() as both:
+        assert_same(both(*problem), alone)
+        assert len(asked) == 1
+        assert_same(both(*problem), alone)
+    assert len(asked) == 1
+
+
+def test_where_no_process_can_be_started_one_does_it_all(problem, alone, monkeypatch):
+    def refuses(_: Cell) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(Cell, "begin", refuses)
+    with SideBySide() as both:
+        assert_same(both(*problem), alone)
+
+
+def test_what_fails_here_ends_both(problem: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(side_by_side, "refitted", interrupted)
+    with pytest.raises(KeyboardInterrupt), SideBySide() as both:
+        both(*problem)
+    assert both._cell.pid == 0
+
+
+@pytest.mark.parametrize(("cores", "kind"), [(1, InTurn), (2, SideBySide)])
+def test_one_core_has_one_process(cores: int, kind: type[InTurn], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(side_by_side, "cores", lambda: cores)
+    with side_by_side.side_by_side(lambda _: None) as made:
+        assert type(made) is kind

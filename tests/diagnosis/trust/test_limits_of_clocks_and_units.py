@@ -5,63 +5,55 @@ from typing import Any
 
 import numpy as np
 import pytest
+from learned_cases import FC, MOUNT, NOISE, Array, night
 from wandering import axis, swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.trust.changes import changes
 from cosim.diagnosis.trust.clocks import ClockOffset
 from cosim.diagnosis.trust.doubts import beyond_denial, without_denied
 from cosim.diagnosis.trust.explanations import Explanation, explanations
 from cosim.diagnosis.trust.judgement import Judgement, stated
 from cosim.diagnosis.trust.likelihood import Evidence, Reference
+from cosim.estimation.prepare import prepare
 from cosim.support.errors import RecordingError
 from cosim.support.units import conversion
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Delay, Effect, TorqueOffset
 from pyfmi_models.effects.clock_skew import ClockSkew
 
-
-@pytest.mark.parametrize(
-    ("lag", "low", "high", "late", "too_late"),
-    [
-        (10, 8, 12, True, False),
-        (8, 8, 12, False, False),  # lags are tried in steps of 2 ms
-        (10, 6, 14, False, False),
-        (-10, -12, -8, True, False),
-        (16, 16, 20, True, False),
-        (18, 16, 20, True, True),
-        (18, 14, 22, True, False),
-        (-18, -20, -16, True, True),
-        (40, 30, 58, True, True),
-        (40, 30, 60, False, False),  # what is not excluded reaches the end of what was tried
-        (12, -2, 26, False, False),
-        (0, -2, 2, False, False),
-    ],
-)
-def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(
-    lag: float, low: float, high: float, late: bool, too_late: bool
-) -> None:
-    found = ClockOffset(lag * 1e-3, low * 1e-3, high * 1e-3)
-    assert (found.is_late, found.is_too_late) == (late, too_late)
+OK, LATE, TOO_LATE = (False, False), (True, False), (True, True)
+"""Whether a lag is late, and too late for a drive."""
 
 
 @pytest.mark.parametrize(
-    ("removed", "least", "late", "too_late"),
+    ("offset", "told"),
     [
-        (0.19, 0.19, False, False),
-        (0.20, 0.20, True, False),
-        (0.69, 0.69, True, False),
-        (0.70, 0.70, True, True),
-        (0.90, -0.24, True, True),
-        (0.90, -0.26, False, False),
+        ((10, 8, 12), LATE),
+        ((8, 8, 12), OK),  # lags are tried in steps of 2 ms
+        ((10, 6, 14), OK),
+        ((-10, -12, -8), LATE),
+        ((16, 16, 20), LATE),
+        ((18, 16, 20), TOO_LATE),
+        ((18, 14, 22), LATE),
+        ((-18, -20, -16), TOO_LATE),
+        ((40, 30, 58), TOO_LATE),
+        ((40, 30, 60), OK),  # what is not excluded reaches the end of what was tried
+        ((12, -2, 26), OK),
+        # It counts by the share that it removes, and is denied by a recording that it makes worse.
+        ((24, 20, 28, 0.19, 0.19), OK),
+        ((24, 20, 28, 0.20, 0.20), LATE),
+        ((24, 20, 28, 0.69, 0.69), LATE),
+        ((24, 20, 28, 0.70, 0.70), TOO_LATE),
+        ((24, 20, 28, 0.90, -0.24), TOO_LATE),
+        ((24, 20, 28, 0.90, -0.26), OK),
     ],
 )
-def test_a_lag_counts_by_the_share_that_it_removes_and_is_denied_by_a_recording_that_it_makes_worse(
-    removed: float, least: float, late: bool, too_late: bool
-) -> None:
-    found = ClockOffset(0.024, 0.020, 0.028, removed, least)
-    assert (found.is_late, found.is_too_late) == (late, too_late)
+def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(offset, told):
+    found = ClockOffset(*(one * 1e-3 for one in offset[:3]), *offset[3:])
+    assert (found.is_late, found.is_too_late) == told
 
 
 def judgement(
@@ -175,7 +167,7 @@ def test_a_lag_stays_where_the_model_wants_one(chosen: tuple[Effect, ...], besid
         return SimpleNamespace(mount=axis(effects=effects))
 
     tried = [SimpleNamespace(effect=beside[0], fit=fitted(beside[0]), evidence=beside[1])] if beside else []
-    left: Any = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))  # type: ignore[arg-type]
+    left: Any = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))
     assert left == ((CLOCKS, SIGN) if stays else (SIGN,))
 
 
@@ -207,3 +199,61 @@ def test_a_ground_that_shakes_is_no_clock_and_two_clocks_stay_two(late: float, s
     found = diagnose([shaken(1, late, shake), shaken(2, late, shake)], [shaken(3, late, shake)], CARD).diagnosis
     assert ("clocks" in [one.finding for one in found.sanity]) is (late > 0)
     assert ("unknown" in found.verdict) is (late > 0)
+
+
+# A change in the middle of a recording is told with time and size; what changes slowly or with the motion is none.
+
+
+AFTER = 25.0
+
+
+def said(more: Array, now: dict[str, Array], seed: int = 1) -> list[str]:
+    """What is said of an axis whose torque holds something more."""
+    noise = np.random.default_rng(seed).normal(0, NOISE, len(now["t"]))
+    tau = 5.0 * now["a"] + FC * np.tanh(now["v"] / 1e-3) + now["v"] + more + noise
+    prepared = prepare([Recording("run", {"t": now["t"], "q": now["q"], "tau": tau})], 10.0)
+    return [one.statement for one in changes((prepared,), MOUNT)]
+
+
+@pytest.mark.parametrize(
+    ("words", "load"),
+    [
+        ("a constant torque of 0.8 N·m more", lambda now: 0.8),
+        ("a constant torque of 0.8 N·m less", lambda now: -0.8),
+        ("a friction level of 0.6 N·m more", lambda now: 0.6 * np.tanh(now["v"] / 1e-3)),
+        ("an inertia of 2 kg·m² more", lambda now: 2.0 * now["a"]),
+        ("a weight of 4 N·m more", lambda now: 4.0 * np.sin(now["q"] + 0.3)),
+    ],
+)
+def test_what_comes_at_a_time_is_told_with_time_and_size(words: str, load) -> None:
+    now = night(1)
+    (text,) = said((now["t"] >= AFTER) * load(now), now)
+    assert words.split(" of ")[0] in text
+    assert float(text.split(" of ")[1].split()[0]) == pytest.approx(float(words.split(" of ")[1].split()[0]), rel=0.1)
+    assert float(text.split("t = ")[1].split()[0]) == pytest.approx(AFTER, abs=0.5)
+    assert words.split()[-1] in text
+
+
+def test_what_is_there_all_the_time_or_changes_slowly_is_no_change_at_a_time() -> None:
+    now = night(2)
+    t, level = now["t"], np.tanh(now["v"] / 1e-3)
+    for more in (0 * t, 0.8 + 0 * t, 4.0 * np.sin(now["q"]), 0.8 * np.exp(-t / 15), 0.6 * level * t / 60, 0.5 * level):
+        assert said(more, now) == []
+
+
+def test_a_change_that_is_small_beside_the_rest_is_not_told() -> None:
+    now = night(4)
+    shaken = 0.6 * np.sin(9.1 * now["t"] + 3 * np.sin(0.9 * now["t"]))
+    assert said(0.4 * (now["t"] >= AFTER) + shaken, now) == []
+
+
+def test_a_law_that_is_off_over_speed_is_no_change_where_the_motion_gets_faster() -> None:
+    t = night(3)["t"]
+    faster = t >= AFTER
+    time = np.where(faster, 6 * t - 5 * AFTER, t)
+    now = {"t": t, "q": 0.4 * np.sin(0.7 * time) + 0.1 * np.sin(1.9 * time)}
+    now["v"] = np.gradient(now["q"], now["t"])
+    now["a"] = np.gradient(now["v"], now["t"])
+    assert np.abs(now["v"][faster]).max() > 2 * np.abs(now["v"][~faster]).max()
+    for more in (1.5 * now["v"] * np.abs(now["v"]), -3.0 * np.tanh(now["v"] / 0.3)):
+        assert said(more, now) == []

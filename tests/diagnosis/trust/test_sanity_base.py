@@ -174,9 +174,7 @@ def waving(share: float, order: float = 0.5) -> Recording:
 
 
 @pytest.mark.parametrize(("share", "least", "most"), [(0.0, -1.0, 0.1), (0.04, 0.1, 0.3), (0.5, 5.9, 6.0)])
-def test_only_a_wave_beyond_what_physics_may_leave_is_gravity_of_another_order(
-    share: float, least: float, most: float
-) -> None:
+def test_only_a_wave_beyond_what_physics_may_leave_is_gravity_of_another_order(share, least, most):
     evidence = Judgement.of([waving(share)], Reference(1.0, 4.0)).evidence
     assert least <= evidence._gravity(evidence.balance(1.0), 0.5) <= most
 
@@ -231,9 +229,7 @@ def beside_speed(t: float = 1.0, q: float = 1.0, v: float = 1.0) -> Recording:
         ({"q": 0.4}, "position_scale", True, "q=2.5 rad"),
     ],
 )
-def test_where_speed_position_and_time_contradict_the_card_says_which_is_wrong(
-    wrong: dict[str, float], finding: str, blocks: bool, option: str
-) -> None:
+def test_where_speed_position_and_time_contradict_the_card_says_which_is_wrong(wrong, finding, blocks, option):
     (said,) = judged([beside_speed(**wrong)], [], Reference(1.0, 4.0))
     assert said.finding == finding
     assert said.blocks_naming == blocks
