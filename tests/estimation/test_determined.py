@@ -67,13 +67,12 @@ def determined(recording: Recording, card: Mount) -> tuple[tuple[str, ...], dict
 @pytest.mark.parametrize(
     "recording",
     [
-        pytest.param(steady(), id="position"),
-        pytest.param(speed_alone(), id="speed alone"),
-        pytest.param(steady(noise=1e-9), id="less noise"),
-        pytest.param(steady(noise=1e-6), id="more noise"),
-        pytest.param(steady(noise=0.0), id="no noise"),
-        pytest.param(steady(speeds=(0.3, -0.1, 0.3, -0.1, 0.2)), id="other speeds"),
+        steady(),
+        speed_alone(),
+        *(steady(noise=n) for n in (1e-9, 1e-6, 0)),
+        steady(speeds=(0.3, -0.1, 0.3, -0.1, 0.2)),
     ],
+    ids=["position", "speed alone", "less noise", "more noise", "no noise", "other speeds"],
 )
 @pytest.mark.parametrize("motion", ["rotary", "linear"])
 def test_constant_speeds_leave_the_inertia_at_the_cards(recording: Recording, motion: str) -> None:
@@ -100,10 +99,12 @@ def test_a_direction_that_was_never_driven_keeps_its_friction() -> None:
     assert numbers["friction.Fc.positive"] == pytest.approx(2.5, rel=0.02)
 
 
-def test_motion_that_speeds_up_determines_all_numbers() -> None:
+def test_motion_that_speeds_up_determines_all_numbers_and_one_that_the_card_has_at_its_bound_may_stay_there() -> None:
     held, numbers = determined(moving(), mount())
     assert held == ()
     assert numbers["axis.inertia"] == pytest.approx(30.0, rel=0.01)
+    problem = problem_of(moving(sigma2=0.0), mount(Coulomb(Fc=4.0, sigma2=0.0)))
+    assert limited(problem, problem.fit(problem.mount, 75).mount)[1].keys() <= {"friction.Fc"}
 
 
 @pytest.mark.parametrize("recorded", [moving(sigma2=-1.0), moving(sigma2=-8.0), moving(coulomb=-0.5)])
@@ -120,11 +121,6 @@ def test_no_number_is_delivered_at_a_bound_and_the_fit_is_hardly_worse(recorded:
     for name, one in limits.items():
         assert one.is_highest == (given[name] > edges[name][0])
     assert problem.error(problem.fit(better, 1)) < 1.01 * problem.error(base)
-
-
-def test_a_number_that_the_card_has_at_its_bound_may_stay_there() -> None:
-    problem = problem_of(moving(sigma2=0.0), mount(Coulomb(Fc=4.0, sigma2=0.0)))
-    assert limited(problem, problem.fit(problem.mount, 75).mount)[1].keys() <= {"friction.Fc"}
 
 
 def test_a_diagnosis_keeps_the_cards_inertia_and_says_so(tmp_path: Path) -> None:

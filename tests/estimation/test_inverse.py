@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 from closed_loop import recorded as recorded_in_loop
@@ -172,34 +171,12 @@ def test_sliding_over_a_rough_track_costs_no_damping_of_the_bristles() -> None:
 # The states of friction along a recorded speed, and what a fit finds with it.
 
 
-def walked(law: FrictionLaw, v: np.ndarray, dt: float) -> np.ndarray:
-    """States at each row: the law's own step at the speed of its middle, at the level that a straight one amounts to.
-
-    That level lies coth(x/2) - 2/x of the way from the middle to the end, x how often a step would build it up.
-    """
-    x, speed, level = ca.SX.sym("x", len(law.states())), ca.SX.sym("v"), ca.SX.sym("level")
-    step = ca.Function("step", [x, speed, level], [law.advance(x, speed, level, dt), law.rate(0 * x, speed, level)])
-    middle, states = (v[1:] + v[:-1]) / 2, [np.zeros(len(law.states()))]
-    for now, end in zip(middle, v[1:], strict=True):
-        here, there = float(law.level(now)), float(law.level(end))
-        times = abs(step(states[-1], now, here)[1].full().sum()) * dt / here
-        late = times / 6 if times < 1e-3 else 1 / np.tanh(times / 2) - 2 / times
-        states.append(step(states[-1], now, here + (there - here) * late)[0].full().ravel())
-    return np.array(states).T
-
-
 def carried(law: FrictionLaw) -> tuple[Piece, np.ndarray]:
     """A recorded motion, and the states of the law that the inverse carries along it."""
     t, q, _v, a = wander()
     piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
     inverse = Inverse(replace(read_card("paper_mount").plant(), friction=law), ())
     return piece, inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
-
-
-@pytest.mark.parametrize("law", WITH_MEMORY.values(), ids=WITH_MEMORY.keys())
-def test_friction_states_follow_the_recorded_speed_by_the_laws_own_step(law: FrictionLaw) -> None:
-    piece, states = carried(law)
-    np.testing.assert_allclose(states, walked(law, piece.v, piece.dt), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("times", [1e-3, 0.0099, 0.0101, 0.3, 3.0, 40.0, 1e4])

@@ -59,22 +59,21 @@ def test_a_noisy_encoder_narrows_the_band_and_white_noise_is_measured_beside_a_s
     assert noise_of(q + 1e-4 * noise, t[1] - t[0]) == pytest.approx(1e-4, rel=0.05)
 
 
-def test_a_gap_cuts_a_recording_in_two_and_nothing_is_filled_in() -> None:
-    t, q, _v, a = wander()
-    keep = (t < 8) | (t > 10)
-    pieces = prepare([recorded((5 * a)[keep], t[keep], q[keep])], 30.0).pieces
-    assert [float(round(piece.t[0])) for piece in pieces] == [0.0, 10.0]
-
-
-def test_a_hole_that_is_short_beside_what_the_filter_passes_is_bridged_and_said() -> None:
+def test_a_gap_cuts_a_recording_a_short_hole_is_bridged_and_nothing_but_holes_is_refused() -> None:
     t, q, v, a = wander()
-    keep = np.ones(len(t), bool)
-    keep[[4000, 4001, 7000]] = False
-    holed = recorded((5 * a)[keep], t[keep], q[keep])
-    (piece,) = prepare([holed], 20.0).pieces
+
+    def holed(kept: np.ndarray) -> list[Recording]:
+        return [recorded((5 * a)[kept], t[kept], q[kept])]
+
+    cut = prepare(holed((t < 8) | (t > 10)), 30.0).pieces
+    assert [float(round(piece.t[0])) for piece in cut] == [0.0, 10.0], "nothing is filled in"
+    short = holed(np.delete(np.arange(len(t)), [4000, 4001, 7000]))
+    (piece,) = prepare(short, 20.0).pieces
     assert np.abs(piece.v - np.interp(piece.t, t, v))[piece.inside].max() < 1e-3
-    assert any("short beside what the filter passes" in said for said in quality(holed, 20.0))
-    assert len(prepare([holed], 100.0).pieces) == 3
+    assert any("short beside what the filter passes" in said for said in quality(short[0], 20.0))
+    assert len(prepare(short, 100.0).pieces) == 3
+    with pytest.raises(RecordingError, match=r"run has \d+ holes in time, and pieces without holes must be 2 s"):
+        prepare(holed((t % 2.5) < 1.5), 30.0)
 
 
 def test_where_polls_are_uneven_the_band_ends_where_lines_bridge_the_steps() -> None:
@@ -92,13 +91,6 @@ def test_where_polls_are_uneven_the_band_ends_where_lines_bridge_the_steps() -> 
     assert np.abs(piece.v - np.interp(piece.t, t, slow))[piece.inside].max() < 0.05 * np.abs(slow).max()
 
 
-def test_a_recording_that_is_nothing_but_holes_is_refused() -> None:
-    t, q, _, a = wander()
-    short = (t % 2.5) < 1.5
-    with pytest.raises(RecordingError, match=r"run has \d+ holes in time, and pieces without holes must be 2 s"):
-        prepare([recorded((5 * a)[short], t[short], q[short])], 30.0)
-
-
 def test_speeds_are_right_where_time_steps_jitter_to_one_side() -> None:
     t, q, v, a = wander()
     late = t + 0.4 * (t[1] - t[0]) * (np.arange(len(t)) % 3 == 0)
@@ -110,14 +102,8 @@ def test_speeds_are_right_where_time_steps_jitter_to_one_side() -> None:
 @pytest.mark.parametrize("rate", [200.0, 1000.0, 5000.0])
 def test_a_constant_speed_has_no_acceleration_at_the_ends_of_its_pieces(rate: float) -> None:
     t = np.arange(round(4 * rate)) / rate
-    (piece,) = prepare([Recording("run", {"t": t, "tau": 0 * t, "q": 0.4 * t})], 10.0).pieces
+    (piece,) = prepare([recorded(0 * t, t, 0.4 * t)], 10.0).pieces
     assert np.abs(piece.lowpass(piece.a)[piece.kept]).max() < 1e-5
-
-
-def test_standard_errors_come_from_five_blocks_at_least() -> None:
-    t = np.arange(3240) / 500
-    short = prepare([Recording("run", {"t": t, "tau": np.cos(t), "q": np.sin(t)})], 20.0)
-    assert len(Blocks.of(short).rows) == 5
 
 
 def test_what_is_thinned_keeps_no_full_recording_alive() -> None:
@@ -130,14 +116,14 @@ def test_what_is_thinned_keeps_no_full_recording_alive() -> None:
     assert all(one.flags.owndata for one in signals)
 
 
-def test_a_number_that_acts_on_no_row_leaves_the_others_their_errors() -> None:
+def test_standard_errors_come_from_five_blocks_at_least_and_from_numbers_that_act_on_rows() -> None:
     """A derivative may be as small as the tail of a bell, and its square none."""
-    rng = np.random.default_rng(1)
+    t, rng = np.arange(3240) / 500, np.random.default_rng(1)
+    assert len(Blocks.of(prepare([recorded(np.cos(t), t, np.sin(t))], 20.0)).rows) == 5
     slopes, left = rng.standard_normal((600, 2)), rng.standard_normal(600)
     blocks = Blocks(tuple(np.split(np.arange(600), 12)), np.zeros(600, int))
-    alone = covariance(slopes, left, blocks)
     beside = covariance(np.column_stack([slopes, np.full(600, 1e-160)]), left, blocks)
-    np.testing.assert_allclose(beside[:2, :2], alone, rtol=1e-9)
+    np.testing.assert_allclose(beside[:2, :2], covariance(slopes, left, blocks), rtol=1e-9)
 
 
 # How much a row counts: rows that repeat one operating point count together, what moves slowly is not at rest.
@@ -210,6 +196,8 @@ def test_a_bristle_that_slides_within_what_the_filter_smears_is_not_remembered(r
 
 def test_what_a_bristle_bends_goes_by_what_it_holds_at_rest() -> None:
     """A Coulomb level that a fit has lost is none: before it slides the bristle holds Fs."""
+    assert remembers(LUGRE, at_speeds(np.full(600, 1.0)))
+    assert not remembers(COULOMB, at_speeds(np.full(600, 1.0))), "a law without memory remembers nothing"
     prepared = turning()
     lost = replace(LUGRE, sigma0=LUGRE.Fs / (2 * least_way(prepared)), Fc=1e-3 * LUGRE.Fs)
     assert remembers(lost, prepared)
@@ -219,11 +207,6 @@ def test_what_a_bristle_bends_goes_by_what_it_holds_at_rest() -> None:
     for law, shown in ((LAWS["static"](Fc=lost.Fc, Fs=LUGRE.Fs, Vs=0.1, sigma2=0.0), True), (still, False)):
         mount = Mount(name="axis", axis=Axis(inertia=1.0), friction=law, effects=(contact,))
         assert hypothesis_of(contact).shows(contact, mount, prepared) is shown
-
-
-def test_a_law_without_memory_remembers_nothing() -> None:
-    assert not remembers(COULOMB, at_speeds(np.full(600, 1.0)))
-    assert remembers(LUGRE, at_speeds(np.full(600, 1.0)))
 
 
 # Pushes against an end stop are found where they are, and nothing else is taken for one.

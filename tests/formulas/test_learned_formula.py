@@ -11,12 +11,12 @@ from functools import cache
 from pathlib import Path
 from runpy import run_path
 from types import SimpleNamespace
-from typing import NamedTuple
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from commands import call
-from learned_cases import Extra, droop, learned, parts, swerve, teeth, warm_place
+from learned_cases import droop, learned, parts, swerve, teeth, warm_place
 from learned_told import TOLD
 from report_example import diagnosis
 
@@ -65,12 +65,6 @@ LAWS = {
 }
 
 
-class Case(NamedTuple):
-    part: Partial
-    train: Rows
-    unseen: Unseen
-
-
 def made(effect, law, seed: int, begins: float = -0.8) -> tuple[Partial, Array, Array]:
     """Rows of a term beside a base with an unknown level and slope, and the value of the law there."""
     rng, many = np.random.default_rng(seed), 4000
@@ -85,10 +79,10 @@ def made(effect, law, seed: int, begins: float = -0.8) -> tuple[Partial, Array, 
     return part, np.column_stack([sign, rng.standard_normal(many)]), noise
 
 
-def case_of(effect, law, begins: float = -0.8) -> Case:
+def case_of(effect, law, begins: float = -0.8) -> tuple[Partial, Rows, Unseen]:
     """A term that was learned of some rows, and others that judge what is proposed."""
     (part, slopes, _), (there, own, noise) = (made(effect, law, seed, begins) for seed in (1, 2))
-    return Case(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
+    return part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left)
 
 
 @cache
@@ -105,7 +99,6 @@ def forms(formula: Formula) -> set[str]:
 @pytest.mark.parametrize("name", LAWS)
 def test_the_right_form_is_found_with_its_numbers_in_their_ranges(name: str) -> None:
     formula = found(name)
-    assert formula is not None
     assert name in forms(formula)
     x = np.linspace(-0.75, 0.95, 200)
     np.testing.assert_allclose(
@@ -115,7 +108,6 @@ def test_the_right_form_is_found_with_its_numbers_in_their_ranges(name: str) -> 
 
 def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> None:
     formula = found("warm")
-    assert formula is not None
     assert forms(formula) == {"bump", "line"}
     told = {name: (value, error) for name, value, error, _ in Spelled(WARM, formula, False).numbers()}
     assert abs(told["centre"][0]) < 4 * told["centre"][1]
@@ -126,7 +118,6 @@ def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> Non
 def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
     """0.05 (y - 18) (x - 0.3), which three coefficients hold and no product of two forms does."""
     formula = proposed(*case_of(WARM, lambda x, y: 0.05 * (y - 18) * (x - 0.3)))
-    assert formula is not None
     assert forms(formula) == {"line"}
     k1, k2, k3 = formula.coefficients  # of x, x y, y
     assert (-k1 / k2, -k3 / k2, k2) == pytest.approx((18.0, 0.3, 0.05), rel=0.05)
@@ -134,7 +125,6 @@ def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
 
 def test_a_sine_of_many_periods_is_found() -> None:
     formula = proposed(*case_of(POSITION, lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14)))
-    assert formula is not None
     assert formula.inner[1] == pytest.approx(0.14, rel=0.01)
 
 
@@ -142,26 +132,20 @@ def test_what_fades_after_a_reversal_has_its_time() -> None:
     """0.7 exp(-t / 0.3 s): the memory's own form, whatever else would fit as well."""
     fading = LearnedAfterReversal(times=(0.1, 0.4), level_change=(0.1, 0.1))
     formula = proposed(*case_of(fading, lambda x: 0.7 * np.exp(-x / 0.3), begins=0.0))
-    assert formula is not None
     said = Spelled(fading, formula, False).as_json()
     assert said["equation"] == "friction × (1 + f), f = k1 exp(−t/fade)"
     assert said["parameters"]["fade"]["value"] == pytest.approx(0.3, rel=0.1)
     assert [said["parameters"][name]["unit"] for name in ("fade", "k1")] == ["s", "1"]
 
 
-def test_of_two_forms_of_one_number_the_lower_power_is_the_shorter() -> None:
-    line, cube = (Formula((Shape(one),), (1.0,)) for one in FORMS if one.name in ("line", "cube"))
-    assert line.length < cube.length
-
-
 def test_where_no_form_fits_there_is_no_formula_nor_where_a_loss_of_all_torque_leaves_no_error() -> None:
     """What is linear in the command and taken out of the base again leaves no error, and says nothing."""
-    now = case_of(POSITION, saw)
-    assert proposed(*now) is None
-    much = 100.0 * float(np.std(now.unseen.rows.left))
+    part, train, unseen = case_of(POSITION, saw)
+    assert proposed(part, train, unseen) is None
+    much = 100.0 * float(np.std(unseen.rows.left))
     line = Formula((Shape(FORMS[0]),), (1.0,), (), (much,))
-    assert not now.unseen.is_of_its_size(line)
-    assert now.unseen.is_of_its_size(replace(line, coefficients=(0.01 * much,)))
+    assert not unseen.is_of_its_size(line)
+    assert unseen.is_of_its_size(replace(line, coefficients=(0.01 * much,)))
 
 
 def test_numbers_have_intervals_that_hold_them_and_units_that_fit() -> None:
@@ -173,15 +157,12 @@ def test_numbers_have_intervals_that_hold_them_and_units_that_fit() -> None:
         assert low - 0.02 < true < high + 0.02
         assert high - low < 0.1
         assert told["unit"] == unit
-    cubed = Spelled(POSITION, found("cube"), True).as_json()
-    assert cubed["parameters"]["k1"]["unit"] == "N/m3"
+    assert Spelled(POSITION, found("cube"), True).as_json()["parameters"]["k1"]["unit"] == "N/m3"
+    line, cube = (Formula((Shape(one),), (1.0,)) for one in FORMS if one.name in ("line", "cube"))
+    assert line.length < cube.length, "of two forms of one number the lower power is the shorter"
 
 
 # The formula that a diagnosis tells beside its table; without the package that searches it tells all else.
-
-
-def broken() -> None:
-    raise ImportError("no module named my_search")
 
 
 @pytest.fixture
@@ -202,7 +183,6 @@ def installed(monkeypatch: pytest.MonkeyPatch):
 def test_the_formula_of_what_was_missing_is_proposed_for_its_table_by_the_names_of_its_quantities() -> None:
     """0.15 (T - 20) exp(-(q / 0.15)^2) N m beside 2 N m of friction."""
     whole = learned(warm_place)
-    assert whole is not None
     (said,), ((form, statement),) = whole.as_json()["formula"], whole.stated()
     numbers = {name: one["value"] for name, one in said["parameters"].items()}
     assert said["over"] == ["position", "temperature"]
@@ -216,19 +196,12 @@ def test_the_formula_of_what_was_missing_is_proposed_for_its_table_by_the_names_
     assert statement in proposal.text()
 
 
-@pytest.mark.parametrize(
-    ("extra", "text"),
-    [(swerve, "added drag = v f, f = k1 |a|"), (teeth, "command × (1 + f), f = k1 sin(2π(q")],
-    ids=["a drag", "a gain"],
-)
-def test_a_formula_is_told_in_its_own_words(extra: Extra, text: str) -> None:
-    (said,) = learned(extra).as_json()["formula"]
-    assert said["equation"].startswith(text)
-    assert extra is not swerve or said["parameters"]["k1"]["value"] == pytest.approx(6.0, rel=0.05)
-
-
-def test_what_a_drive_holds_back_is_told_over_the_command_that_the_model_needs() -> None:
-    """Over the recorded command a line would say all: it holds what is left, and a line is a scale of the base."""
+def test_a_formula_is_told_in_its_own_words() -> None:
+    (drag,), (gain,) = (learned(extra).as_json()["formula"] for extra in (swerve, teeth))
+    assert drag["equation"].startswith("added drag = v f, f = k1 |a|")
+    assert drag["parameters"]["k1"]["value"] == pytest.approx(6.0, rel=0.05)
+    assert gain["equation"].startswith("command × (1 + f), f = k1 sin(2π(q")
+    # Over the recorded command a line would say all that a drive holds back: a line is a scale of the base.
     assert all(one["equation"] != "not given = k1 u" for one in learned(droop).as_json()["formula"])
 
 
@@ -236,22 +209,19 @@ def test_the_search_is_found_by_its_entry_point_and_without_one_all_is_said_but_
     assert [plugins.loaded("cosim.formulas", name) for name in plugins.names("cosim.formulas")] == [find]
     installed({})
     left = learn(*parts(warm_place))
-    assert left is not None
     assert left.as_json() == {**learned(warm_place).as_json(), "formula": []}
     assert left.stated() == ()
 
 
-def test_to_propose_without_a_search_is_refused_at_once(installed, tmp_path: Path, capsys) -> None:
+def test_to_propose_without_a_search_or_with_one_that_cannot_be_loaded_is_refused_at_once(installed, tmp_path, capsys):
     installed({})
     run = tmp_path / "run.csv"
     run.write_text("t,q,tau\n0,0,0\n", "utf-8")
     assert call("diagnose", run, run, "--propose", tmp_path / "drafts") == 2
     assert "--propose: no installed package searches for formulas" in capsys.readouterr().err
     assert not (tmp_path / "drafts").exists()
-
-
-def test_a_search_that_cannot_be_loaded_is_told_before_anything_is_fitted(installed) -> None:
-    installed({"mine": SimpleNamespace(name="mine", value="my_search:find", dist=None, load=broken)})
+    load = Mock(side_effect=ImportError("no module named my_search"))
+    installed({"mine": SimpleNamespace(name="mine", value="my_search:find", dist=None, load=load)})
     with pytest.raises(PlugInError, match='"mine" of my_search:find cannot be loaded: ImportError'):
         diagnose([], [], read_card("paper_mount"))
 
@@ -341,7 +311,10 @@ def test_the_property_tests_of_effects_hold_for_the_files_where_a_person_has_put
     assert int(re.findall(r"(\d+) passed", done.stdout)[-1]) >= 4 * len(proposals())
 
 
-def test_nothing_loads_it_and_none_is_written_over(tmp_path: Path) -> None:
+def test_a_person_reads_all_of_it_nothing_loads_it_and_none_is_written_over(tmp_path: Path) -> None:
+    text = proposals()[0].text()
+    for part in ("torque = k1 exp(−((q − centre)/width)²)", "Fitted; 95 % ", "SEEN_Q = (-0.8, 1.0)", "It was learned."):
+        assert part in text
     first = write_proposals(proposals()[:1], tmp_path / "new")
     assert [path.name for path in first] == ["proposed_torque_over_position.py"]
     with pytest.raises(OutputError, match="exists already; give --force"):
@@ -363,9 +336,3 @@ def test_where_there_is_nothing_to_propose_one_sentence_says_why(tmp_path: Path)
     ):
         assert terminal.proposed(found_, ()) == f"Nothing to propose: {reason}."
     assert terminal.proposed(table, [Path("a/b.py")]).startswith("Proposed, for you to review: a/b.py")
-
-
-def test_a_person_reads_equation_numbers_with_ranges_and_the_range_that_was_seen() -> None:
-    text = proposals()[0].text()
-    for part in ("torque = k1 exp(−((q − centre)/width)²)", "Fitted; 95 % ", "SEEN_Q = (-0.8, 1.0)", "It was learned."):
-        assert part in text

@@ -115,13 +115,7 @@ SURE = effect("delay", 80.0, 0.9)
 @pytest.mark.parametrize(
     ("named", "evidence", "share"),
     [([], 8.0, 0.25), ([], 16.0, 0.25 - LITTLE), ([], 16.0, 0.0), ([], 128.0, -LITTLE), ([SURE], 20.0, 0.5)],
-    ids=[
-        "followed",
-        "hardly followed",
-        "not followed",
-        "the error grows",
-        "a share of a sure name's",
-    ],
+    ids=["followed", "hardly followed", "not followed", "the error grows", "a share of a sure name's"],
 )
 def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say(named, evidence, share):
     assert is_left(named, position(evidence, share), ROUND)

@@ -42,17 +42,10 @@ Declared = Callable[..., None]
 def declared(monkeypatch: pytest.MonkeyPatch) -> Declared:
     """What the hypothesis of an effect declares, as a table."""
 
-    def declare(
-        plausible: bool = True,
-        shown: bool = True,
-        degenerate: bool = False,
-        back: float = 0.0,
-        timing: bool = True,
-        at_bound: bool = False,
-    ) -> None:
-        said = {"is_plausible": plausible, "shows": shown, "is_degenerate": degenerate, "way_back": back}
+    def declare(at_bound: bool = False, is_timing: bool = True, **more: Any) -> None:
+        said = {"is_plausible": True, "shows": True, "is_degenerate": False, "way_back": 0.0} | more
         asked = {name: lambda *_, answer=answer: answer for name, answer in said.items()}
-        hypothesis = SimpleNamespace(sizes=(), may_end=(), is_timing=timing, **asked)
+        hypothesis = SimpleNamespace(sizes=(), may_end=(), is_timing=is_timing, **asked)
         monkeypatch.setattr(admissibility, "hypothesis_of", lambda _: hypothesis)
         monkeypatch.setattr(admissibility, "at_bound", lambda *_: at_bound)
         monkeypatch.setattr(admissibility, "recorded_by", lambda _: None)
@@ -74,7 +67,7 @@ def to_and_fro(*reach: float) -> Motion:
 
 @pytest.mark.parametrize(("back", "needed"), [(0.29, False), (0.3, False), (0.31, True)])
 def test_friction_is_told_by_the_longest_way_back_of_any_recording(back, needed, declared):
-    declared(back=back)
+    declared(way_back=back)
     down = Motion({"v": [np.ones(6)], "q": [-one for one in to_and_fro(0.3).columns["q"]]})
     for motion in (to_and_fro(0.3, 0.1), to_and_fro(0.1, 0.3), down):
         assert needs_turns(EFFECT, None, motion) is needed
@@ -86,10 +79,10 @@ def test_friction_is_told_by_the_longest_way_back_of_any_recording(back, needed,
         (EFFECT, {}, False, True),
         (BROKEN, {}, True, False),
         (EFFECT, {"at_bound": True}, True, False),
-        (EFFECT, {"degenerate": True}, True, False),
-        (EFFECT, {"plausible": False}, False, False),
-        (EFFECT, {"shown": False}, False, False),
-        (EFFECT, {"back": 0.5}, False, False),
+        (EFFECT, {"is_degenerate": True}, True, False),
+        (EFFECT, {"is_plausible": False}, False, False),
+        (EFFECT, {"shows": False}, False, False),
+        (EFFECT, {"way_back": 0.5}, False, False),
     ],
 )
 def test_an_effect_is_admissible_if_nothing_speaks_against_it(effect, said, degenerate, admissible, declared):
@@ -120,7 +113,7 @@ ONE_ROW = replace_at(0.1 * STEPS, 2, 1e3)
     ],
 )
 def test_timing_is_told_where_half_of_the_torques_changes_are_explained(residual, more, told, declared):
-    declared(timing=more.get("timing", True))
+    declared(is_timing=more.get("timing", True))
     motion = Motion({"v": [np.ones(4)] * 2, "tau": [STEPS[:4], STEPS[4:]]}, more.get("asked", []))
     problem: Any = SimpleNamespace(prepared=motion, weight=more.get("weight", np.ones(8)))
     one: Any = SimpleNamespace(effect=EFFECT, fit=SimpleNamespace(residual=residual))

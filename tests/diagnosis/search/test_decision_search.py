@@ -182,14 +182,10 @@ def accepted(
     return AcceptedEffect((Named(name),), own, without, others, margins, margins)
 
 
-def test_margins_are_those_of_the_set_point_where_it_tells_the_two_apart() -> None:
-    one = replace(accepted("x", r=30.0, s=40.0), margins={"r": 90.0, "s": 90.0})
+def test_margins_are_those_of_the_set_point_where_it_tells_and_what_raises_the_error_explains_nothing() -> None:
+    one = replace(accepted("x", removes=0.4, r=30.0, s=40.0), margins={"r": 90.0, "s": 90.0})
     assert margins(one) == {"r": 30.0, "s": 40.0}
     assert margins(replace(one, misfits={"x": 4.0, "r": 12.0})) == {"r": 4.0, "s": 40.0}, "half of chi-squared is nats"
-
-
-def test_what_raises_the_error_explains_nothing() -> None:
-    one = accepted("x", removes=0.4, r=30.0, s=40.0)
     one = replace(one, rivals=(one.rivals[0], replace(one.rivals[1], plain_gain=-0.2)))
     assert explains(one) == {"x": 0.4, "r": 0.5, "s": 0.0}
 
@@ -302,20 +298,17 @@ def test_effects_stand_by_what_they_predict(nats, errors, stands, proven):
     assert ids(proof.unproven) == "".join(name for name in "xy" if name not in stands)
 
 
-def test_effects_are_worth_what_is_lost_without_them(proven: Prove) -> None:
+def test_effects_are_worth_what_is_lost_without_them_and_the_list_ends_where_prediction_is_best(proven: Prove) -> None:
     assert proven({"x": 10.0, "xy": 17.0, "y": 5.0}, *listed("xy"))[1].predicted == {"x": 12.0, "y": 7.0}
     assert proven({"x": -1.0, "xy": -2.0, "y": -1.0}, *listed("xy"))[1].predicted == {"x": 0.0, "y": 0.0}
+    _, proof, standing = proven({"x": -1.0, "xy": 20.0, "y": 22.0, "xyz": 19.0}, *listed("xyz"))
+    assert standing == "y", "x raises nothing and predicts nothing: it is taken out; z is beyond the best"
+    assert proof.predicted == {"x": -2.0, "y": 22.0, "z": 0.0}
 
 
 @pytest.mark.parametrize(("more", "stands"), [(7.0, "x"), (29.0, "x"), (31.0, "ux")])
 def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(more, stands, proven):
     assert proven({"x": 10.0, "ux": 10.0 + more, "u": more}, *listed("xu"))[2] == stands
-
-
-def test_the_list_ends_where_prediction_is_best_and_one_that_does_not_help_loses_no_later_one(proven: Prove) -> None:
-    _, proof, standing = proven({"x": -1.0, "xy": 20.0, "y": 22.0, "xyz": 19.0}, *listed("xyz"))
-    assert standing == "y", "x raises nothing and predicts nothing: it is taken out; z is beyond the best"
-    assert proof.predicted == {"x": -2.0, "y": 22.0, "z": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -356,11 +349,6 @@ def test_only_what_training_has_near_it_with_evidence_of_its_own_is_asked(behind
     assert proven({"x": -2.0, "y": 8.0}, refused)[2] == stands
 
 
-def test_an_effect_that_is_in_the_list_takes_no_other_place(proven: Prove) -> None:
-    nats = {"x": -2.0, "v": -1.0, "vx": -3.0, "vv": 40.0}
-    assert proven(nats, accepted("x", "v", v=1.0), accepted("v"))[2] == ""
-
-
 def test_of_several_members_the_one_that_predicts_best_and_its_own_rivals(proven: Prove) -> None:
     nats = {"x": -2.0, "y": 8.0, "z": 9.0, "w": -5.0}
     found, proof, standing = proven(nats, accepted("x", y=0.5, z=1.0, w=6.0))
@@ -373,3 +361,5 @@ def test_beside_what_stands_a_member_must_leave_it_standing(proven: Prove) -> No
     nats = {"v": 30.0, "x": -2.0, "vx": 28.0, "y": 29.0, "vy": 40.0}
     assert proven(nats, *effects)[2] == "vy"
     assert proven(nats | {"vy": 31.0}, *effects)[2] == "v"
+    listed_too = {"x": -2.0, "v": -1.0, "vx": -3.0, "vv": 40.0}
+    assert proven(listed_too, accepted("x", "v", v=1.0), accepted("v"))[2] == "", "one that is listed takes no place"

@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -72,7 +73,6 @@ def compared(extra: object) -> tuple[Comparison, Fit]:
 def test_a_stribeck_curve_has_the_exponent_of_the_recorded_friction(delta: float) -> None:
     comparison, base = compared(lambda _, v: 1.6 * np.exp(-((np.abs(v) / 0.08) ** delta)) * np.sign(v))
     found = refitted(comparison, base, StribeckEffect(Fs=3.0, Vs=0.05), 1).effect
-    assert isinstance(found, StribeckEffect)
     assert found.delta == pytest.approx(delta, abs=0.15)
     assert found.Vs == pytest.approx(0.08, rel=0.15)
 
@@ -92,9 +92,7 @@ def test_what_is_there_is_tried_though_another_imitates_it_or_it_is_another_in_e
 
 def best_beside(extra: object) -> CandidateFit:
     comparison, base = compared(extra)
-    best = best_of(comparison, stage(comparison, base))
-    assert best is not None
-    return best
+    return best_of(comparison, stage(comparison, base))
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1])
@@ -198,7 +196,6 @@ def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> N
     comparison, base = compared(lambda q, _: 0.005 * np.sin(40 * q) + 0.02 * rng.standard_normal(len(q)))
     first = stage(comparison, base)
     best = best_of(comparison, first)
-    assert best is not None
     assert best.effect.id == "cogging"
     assert is_small(best, POLICY)
     assert best_of(comparison, first, 1.0) is None, "beside another effect it may be what that one's equation lacks"
@@ -228,7 +225,6 @@ def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over()
     level = float(base.mount.friction.Fc)
     assert level > 1.9 * LEVEL
     found = refitted(comparison, base, StribeckEffect(Fs=level, Vs=0.01), 1)
-    assert isinstance(found.effect, StribeckEffect)
     assert found.effect.Fs == pytest.approx(2 * LEVEL, rel=0.05)
     assert comparison.problem.error(found.fit) < 0.3 * comparison.problem.error(base)
 
@@ -294,13 +290,13 @@ def assert_same(found: list[CandidateFit], expected: list[CandidateFit]) -> None
         assert np.array_equal(one.fit.slopes, other.fit.slopes)
 
 
-def counted(monkeypatch: pytest.MonkeyPatch, before: Callable[[Cell, int], None] = lambda *_: None) -> list[object]:
+def counted(monkeypatch: pytest.MonkeyPatch, before: Callable[[Cell], None] = lambda _: None) -> list[object]:
     """What the other process was asked for, which this one waits for; something happens to it before that."""
     asked, call, here, begun = [], Cell.call, side_by_side.refitted, Event()
 
     def counting(cell: Cell, function: Any, *arguments: Any) -> Any:
         if function is side_by_side._refitted:
-            before(cell, len(asked))
+            before(cell)
             asked.append(arguments[0])
             begun.set()
         return call(cell, function, *arguments)
@@ -321,13 +317,12 @@ def test_two_processes_find_what_one_finds(problem, alone, monkeypatch):
         assert_same(both(*problem), alone)
         assert_same(both(*problem), alone)
     assert asked
-    assert said
-    assert said[0] == "Backlash (1 of 4)"
+    assert said[:1] == ["Backlash (1 of 4)"]
     assert len(asked) + len(said) == 8
 
 
 def test_what_a_process_had_taken_when_it_was_killed_is_done_here(problem, alone, monkeypatch):
-    asked = counted(monkeypatch, lambda cell, _: os.kill(cell.pid, signal.SIGKILL))
+    asked = counted(monkeypatch, lambda cell: os.kill(cell.pid, signal.SIGKILL))
     with SideBySide() as both:
         assert_same(both(*problem), alone)
         assert len(asked) == 1
@@ -336,19 +331,13 @@ def test_what_a_process_had_taken_when_it_was_killed_is_done_here(problem, alone
 
 
 def test_where_no_process_can_be_started_one_does_it_all(problem, alone, monkeypatch):
-    def refuses(_: Cell) -> None:
-        raise OSError("no room")
-
-    monkeypatch.setattr(Cell, "begin", refuses)
+    monkeypatch.setattr(Cell, "begin", Mock(side_effect=OSError("no room")))
     with SideBySide() as both:
         assert_same(both(*problem), alone)
 
 
 def test_what_fails_here_ends_both(problem: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(side_by_side, "refitted", interrupted)
+    monkeypatch.setattr(side_by_side, "refitted", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt), SideBySide() as both:
         both(*problem)
     assert both._cell.pid == 0

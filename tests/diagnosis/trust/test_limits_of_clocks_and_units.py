@@ -24,36 +24,17 @@ from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Delay, Effect, TorqueOffset
 from pyfmi_models.effects.clock_skew import ClockSkew
 
-OK, LATE, TOO_LATE = (False, False), (True, False), (True, True)
-"""Whether a lag is late, and too late for a drive."""
+# Milliseconds: a lag, what is not excluded from and to; the share that it removes, and the least of a recording.
+# Lags are tried in steps of 2 ms from -60 to 60; a recording that a lag makes worse denies it.
+NOT_LATE = [(8, 8, 12), (10, 6, 14), (40, 30, 60), (12, -2, 26), (24, 20, 28, 0.19, 0.19), (24, 20, 28, 0.90, -0.26)]
+LATE = [(10, 8, 12), (-10, -12, -8), (16, 16, 20), (18, 14, 22), (24, 20, 28, 0.20, 0.20), (24, 20, 28, 0.69, 0.69)]
+TOO_LATE = [(18, 16, 20), (-18, -20, -16), (40, 30, 58), (24, 20, 28, 0.70, 0.70), (24, 20, 28, 0.90, -0.24)]
 
 
-@pytest.mark.parametrize(
-    ("offset", "told"),
-    [
-        ((10, 8, 12), LATE),
-        ((8, 8, 12), OK),  # lags are tried in steps of 2 ms
-        ((10, 6, 14), OK),
-        ((-10, -12, -8), LATE),
-        ((16, 16, 20), LATE),
-        ((18, 16, 20), TOO_LATE),
-        ((18, 14, 22), LATE),
-        ((-18, -20, -16), TOO_LATE),
-        ((40, 30, 58), TOO_LATE),
-        ((40, 30, 60), OK),  # what is not excluded reaches the end of what was tried
-        ((12, -2, 26), OK),
-        # It counts by the share that it removes, and is denied by a recording that it makes worse.
-        ((24, 20, 28, 0.19, 0.19), OK),
-        ((24, 20, 28, 0.20, 0.20), LATE),
-        ((24, 20, 28, 0.69, 0.69), LATE),
-        ((24, 20, 28, 0.70, 0.70), TOO_LATE),
-        ((24, 20, 28, 0.90, -0.24), TOO_LATE),
-        ((24, 20, 28, 0.90, -0.26), OK),
-    ],
-)
-def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(offset, told):
+@pytest.mark.parametrize("offset", [*NOT_LATE, *LATE, *TOO_LATE])
+def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(offset: tuple[float, ...]) -> None:
     found = ClockOffset(*(one * 1e-3 for one in offset[:3]), *offset[3:])
-    assert (found.is_late, found.is_too_late) == told
+    assert (found.is_late, found.is_too_late) == (offset not in NOT_LATE, offset in TOO_LATE)
 
 
 def judgement(
@@ -69,26 +50,16 @@ def judgement(
     return Judgement((run,), evidence, (right, wrong), (1 - probability, probability))
 
 
-@pytest.mark.parametrize(
-    ("slip", "refused"),
-    [
-        ((10.1, 0.91), True),
-        ((1 / 10.1, 0.91), True),
-        ((9.9, 0.99), False),
-        ((1 / 9.9, 0.99), False),
-        ((57.3, 0.91), True),
-        ((57.3, 0.89), False),
-        ((1000.0, 0.89), False),
-        ((1000.0, 0.99, "time_unit", "--units t=ms"), True),
-        ((1000.0, 0.99, "torque_scale", "--units tau=mN.m"), False),
-        ((1000.0, 0.99, "position_scale", ""), False),
-    ],
-)
-def test_a_scale_of_position_or_time_is_refused_where_it_is_wrong_by_more_than_ten_surely_and_an_option_puts_it_right(
-    slip: tuple[Any, ...], refused: bool
-) -> None:
+# Factor and probability of a slip of position, or of another kind that an option puts right, or none does.
+STATED = [(9.9, 0.99), (1 / 9.9, 0.99), (57.3, 0.89), (1e3, 0.89)]
+STATED += [(1e3, 0.99, "torque_scale", "--units tau=mN.m"), (1e3, 0.99, "position_scale", "")]
+REFUSED = [(10.1, 0.91), (1 / 10.1, 0.91), (57.3, 0.91), (1e3, 0.99, "time_unit", "--units t=ms")]
+
+
+@pytest.mark.parametrize("slip", [*STATED, *REFUSED])
+def test_a_scale_of_position_or_time_is_refused_if_wrong_by_more_than_ten_surely_and_an_option_puts_it_right(slip):
     kind, option = slip[2:] or ("position_scale", "--units q=x")
-    if refused:
+    if slip in REFUSED:
         with pytest.raises(RecordingError, match=f"Use {option}"):
             stated(judgement(*slip))
     else:
@@ -136,11 +107,7 @@ def test_a_gear_from_3_to_300_is_tried_before_position_torque_or_both(linear: bo
     steps = np.diff(np.log(ratios))
     assert not gears or (ratios[0], ratios[-1], steps.max() < 0.3) == (3.0, 300.0, True)
     for one in found:
-        assert (one.torque, one.position) in {
-            (1.0, one.factor),
-            (1 / one.factor, one.factor),
-            (1 / one.factor, 1.0),
-        }
+        assert (one.torque, one.position) in {(1.0, one.factor), (1 / one.factor, one.factor), (1 / one.factor, 1.0)}
 
 
 # A lag between the clocks that the model with its effects denies is not said, and withholds no name.
@@ -149,26 +116,22 @@ CLOCKS = Sanity(finding="clocks", statement="late", blocks_naming=True)
 SIGN = Sanity(finding="torque_sign", statement="turned", blocks_naming=True)
 
 
-@pytest.mark.parametrize(
-    ("chosen", "beside", "stays"),
-    [
-        ((), (), False),
-        ((TorqueOffset(torque=1.0),), (), False),
-        ((Delay(delay_ms=20.0),), (), True),
-        ((Delay(delay_ms=2.0),), (), False),
-        ((ClockSkew(offset_ms=-20.0, drift_ppm=0.0),), (), True),
-        ((), (Delay(delay_ms=20.0), 3.0), True),
-        ((), (Delay(delay_ms=20.0), -1.0), False),
-        ((), (TorqueOffset(torque=20.0), 50.0), False),
-    ],
-)
-def test_a_lag_stays_where_the_model_wants_one(chosen: tuple[Effect, ...], beside: Any, stays: bool) -> None:
+LATE_BY_20 = Delay(delay_ms=20.0)
+LAGS = [((LATE_BY_20,), ()), ((ClockSkew(offset_ms=-20.0, drift_ppm=0.0),), ()), ((), (LATE_BY_20, 3.0))]
+NONE = [((), ()), ((TorqueOffset(torque=1.0),), ()), ((Delay(delay_ms=2.0),), ())]
+NONE += [((), (LATE_BY_20, -1.0)), ((), (TorqueOffset(torque=20.0), 50.0))]
+
+
+@pytest.mark.parametrize(("chosen", "beside"), [*LAGS, *NONE])
+def test_a_lag_stays_where_the_model_wants_one(chosen: tuple[Effect, ...], beside: Any) -> None:
+    """In the model, or beside it with its evidence."""
+
     def fitted(*effects: Effect) -> Any:
         return SimpleNamespace(mount=axis(effects=effects))
 
     tried = [SimpleNamespace(effect=beside[0], fit=fitted(beside[0]), evidence=beside[1])] if beside else []
-    left: Any = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))
-    assert left == ((CLOCKS, SIGN) if stays else (SIGN,))
+    left = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))
+    assert left == ((CLOCKS, SIGN) if (chosen, beside) in LAGS else (SIGN,))
 
 
 def test_what_no_model_settles_is_never_left_out() -> None:
@@ -234,17 +197,13 @@ def test_what_comes_at_a_time_is_told_with_time_and_size(words: str, load) -> No
     assert words.split()[-1] in text
 
 
-def test_what_is_there_all_the_time_or_changes_slowly_is_no_change_at_a_time() -> None:
+def test_what_is_there_all_the_time_changes_slowly_or_is_small_beside_the_rest_is_no_change_at_a_time() -> None:
     now = night(2)
     t, level = now["t"], np.tanh(now["v"] / 1e-3)
     for more in (0 * t, 0.8 + 0 * t, 4.0 * np.sin(now["q"]), 0.8 * np.exp(-t / 15), 0.6 * level * t / 60, 0.5 * level):
         assert said(more, now) == []
-
-
-def test_a_change_that_is_small_beside_the_rest_is_not_told() -> None:
     now = night(4)
-    shaken = 0.6 * np.sin(9.1 * now["t"] + 3 * np.sin(0.9 * now["t"]))
-    assert said(0.4 * (now["t"] >= AFTER) + shaken, now) == []
+    assert said(0.4 * (now["t"] >= AFTER) + 0.6 * np.sin(9.1 * now["t"] + 3 * np.sin(0.9 * now["t"])), now) == []
 
 
 def test_a_law_that_is_off_over_speed_is_no_change_where_the_motion_gets_faster() -> None:

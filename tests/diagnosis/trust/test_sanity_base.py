@@ -138,25 +138,17 @@ def test_what_rests_or_is_short_is_refused_by_its_name(bad: Recording, says: str
             check_recordings(train, heldout)
 
 
-@pytest.mark.parametrize(
-    ("train", "enough"),
-    [
-        ([swung(8.0)], True),
-        ([swung(7.9)], False),
-        ([swung(4.0), swung(4.0)], True),
-        ([spun(8.0, 1.0)], True),
-        ([spun(7.9, 1.0)], False),  # a constant speed has no cycles
-        ([swung(4.0, hertz=0.6)], True),  # 2.4 cycles in 4 s
-        ([swung(4.0, hertz=0.4)], False),
-        ([swung(3.9, hertz=0.6)], False),
-        ([swung(4.0, hertz=0.6, rate=130.0)], True),  # 520 rows
-        ([swung(4.0, hertz=0.6, rate=120.0)], False),  # 480 rows
-    ],
-)
-def test_what_is_fitted_is_eight_seconds_or_four_with_two_cycles_in_500_rows(train: Any, enough: bool) -> None:
-    with (
-        nullcontext() if enough else pytest.raises(RecordingError, match="needs 8 s, or 4 s with 2 cycles in 500 rows")
-    ):
+SWUNG = swung(4.0, hertz=0.6)  # 2.4 cycles
+ENOUGH = [[swung(8.0)], [swung(4.0), swung(4.0)], [spun(8.0, 1.0)], [SWUNG], [swung(4.0, hertz=0.6, rate=130.0)]]
+# A constant speed has no cycles; 120 rows a second are 480.
+TOO_LITTLE = [[swung(7.9)], [spun(7.9, 1.0)], [swung(4.0, hertz=0.4)], [swung(3.9, hertz=0.6)]]
+TOO_LITTLE += [[swung(4.0, hertz=0.6, rate=120.0)]]
+
+
+@pytest.mark.parametrize("train", [*ENOUGH, *TOO_LITTLE])
+def test_what_is_fitted_is_eight_seconds_or_four_with_two_cycles_in_500_rows(train: list[Recording]) -> None:
+    refused = pytest.raises(RecordingError, match="8 s, or 4 s with 2 cycles in 500 rows")
+    with refused if any(train is one for one in TOO_LITTLE) else nullcontext():
         check_recordings(train, [swung(2.0, hertz=2.0)])
 
 

@@ -71,11 +71,11 @@ def said(
     return [(one.finding, one.statement, one.blocks_naming) for one in doubts(train, [held], card)]
 
 
+RIGHT = ("", "gravity_unbalance", "cable_wrap", "load_dependent_friction", "delay", "compliance", "clock_skew")
+
+
 class TestGenerated:
-    @pytest.mark.parametrize(
-        "effect",
-        ["", "gravity_unbalance", "cable_wrap", "load_dependent_friction", "delay", "compliance", "clock_skew"],
-    )
+    @pytest.mark.parametrize("effect", RIGHT)
     def test_a_recording_that_is_right_is_not_doubted(self, effect: str) -> None:
         assert said(*generated(950, effect)) == []
 
@@ -235,16 +235,13 @@ def steps(rows: int, seed: int) -> Recording:
 
 
 @pytest.mark.filterwarnings("error")
-def test_recordings_too_short_to_say_anything_are_not_doubted() -> None:
-    assert judged([steps(60, 1), steps(60, 2)], [steps(60, 3)], Reference(5.0, 2.0)) == ()
-
-
-def test_many_recordings_are_judged_in_a_few_groups() -> None:
+def test_many_recordings_are_judged_in_a_few_groups_and_ones_too_short_to_say_anything_not_doubted() -> None:
     many = [steps(700, seed) for seed in range(20)]
     assert judged(many[:15], many[15:], Reference(5.0, 2.0)) == ()
     flipped = [replace(one, table={**one.table, "tau": -one["tau"]}) for one in many]
     assert "sign" in judged(flipped[:15], flipped[15:], Reference(5.0, 2.0))[0].finding
     assert [len(group) for group in _groups(many)] == [3, 3, 4, 3, 3, 4]
+    assert judged([steps(60, 1), steps(60, 2)], [steps(60, 3)], Reference(5.0, 2.0)) == ()
 
 
 # Measured recordings, or ones that are made of the same machines' numbers, as they are and with a slip put in.
