@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from problems import diagnosed
 from scipy.spatial.transform import Rotation
-from two_links import TIP, WEIGHT, coupling, elbow, forearm, joint, tones, wrist
+from two_links import LEVER, OWN, TIP, WEIGHT, elbow, forearm, joint, tones, wrist
 
 import cosim.delivery
 from cosim.api.why import Written
@@ -31,7 +31,7 @@ from cosim_investigation.questions import effect_of
 from pyfmi_models.card import CardError, parse_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects.axis_coupling import PRODUCTS, ChainCoupling, SpaceCoupling, WeightCoupling
-from pyfmi_models.effects.base import Effect, Motion
+from pyfmi_models.effects.base import Motion
 from pyfmi_models.mount import Mount
 
 ELBOW, JOINT, WRIST = (
@@ -59,7 +59,8 @@ def of_joint(acting: Mapping[int, tuple[float, float]], **more: float) -> Outcom
 def test_a_neighbour_whose_columns_are_there_is_named_with_its_inertia_and_its_weight() -> None:
     (one,) = (finding for finding in of_elbow("tones").findings if finding.effect == "axis_coupling")
     assert one.answer == "found"
-    assert one.parameters["inertia"] == pytest.approx(coupling(), rel=0.15)
+    folded = np.cos(np.concatenate([elbow(seed)["q"] for seed in (1, 2)]))
+    assert one.parameters["inertia"] == pytest.approx(OWN + LEVER * np.mean(folded), rel=0.15)
     assert one.parameters["weight"] == pytest.approx(WEIGHT, rel=0.15)
     assert (one.parameters["phase"], one.parameters["follows"]) == (pytest.approx(0.0, abs=0.05), 1.0)
     assert "per rad/s² of `q1`" in one.statement
@@ -122,28 +123,15 @@ def test_columns_of_a_neighbour_are_told_by_the_fields_usual_names(
     assert list(neighbours(["t", "tau", "q", *columns], units)) == expected
 
 
-BOTH = {"weight": 2.0, "neighbour": "a + b"}
-
-
-@pytest.mark.parametrize(
-    ("effect", "unit", "end"),
-    [
-        (
-            WeightCoupling(inertia=0.12, weight=1.1, follows=0.0, neighbour="q2"),
-            "N·m",
-            "0.12 N·m per rad/s² of `q2`, a weight of 1.1 N·m that goes with the angle `q2`.",
-        ),
-        (ChainCoupling(follows=-1.0, follows_second=-1.0, **BOTH), "N·m", "the angle - this axis + `a` - `b`."),
-        (ChainCoupling(follows=0.0, follows_second=1.0, **BOTH), "N", "of 2 N that goes with the angle `a` + `b`."),
-        (
-            SpaceCoupling(sss=3.0, ccc=-4.0, neighbour="a + b"),
-            "N·m",
-            "a weight of 5 N·m at most that goes with three angles, this axis', `a` and `b`.",
-        ),
-    ],
-)
-def test_a_sentence_names_the_columns_and_says_which_way_they_turn(effect: Effect, unit: str, end: str) -> None:
-    assert effect.statement(unit).endswith(end)
+def test_a_sentence_names_the_columns_and_says_which_way_they_turn() -> None:
+    said = WeightCoupling(inertia=0.12, weight=1.1, follows=0.0, neighbour="q2").statement()
+    assert said.endswith("0.12 N·m per rad/s² of `q2`, a weight of 1.1 N·m that goes with the angle `q2`.")
+    said = ChainCoupling(weight=2.0, follows=-1.0, follows_second=-1.0, neighbour="a + b").statement()
+    assert said.endswith("a weight of 2 N·m that goes with the angle - this axis + `a` - `b`.")
+    said = ChainCoupling(weight=2.0, follows=0.0, follows_second=1.0, neighbour="a + b").statement("N")
+    assert said.endswith("a weight of 2 N that goes with the angle `a` + `b`.")
+    said = SpaceCoupling(sss=3.0, ccc=-4.0, neighbour="a + b").statement()
+    assert said.endswith("a weight of 5 N·m at most that goes with three angles, this axis', `a` and `b`.")
 
 
 @pytest.mark.parametrize(
@@ -154,9 +142,7 @@ def test_a_sentence_names_the_columns_and_says_which_way_they_turn(effect: Effec
         ('weight = 1\nfollows_second = 1\nneighbour = "q1 + q9"', wrist(1), 'reads "q9", which this recording lacks'),
     ],
 )
-def test_a_card_that_names_a_column_which_is_not_there_is_refused_with_those_that_are(
-    keys: str, run: Recording, sentence: str
-) -> None:
+def test_a_card_that_names_a_column_which_is_not_there_is_refused(keys: str, run: Recording, sentence: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         check_neighbours(coupled(ELBOW, keys), [run])
 
@@ -198,8 +184,7 @@ def test_a_card_with_two_couplings_reads_two_inputs_and_needs_the_sum_of_their_t
     inputs = {variable.name: variable.description for variable in both.model().inputs}
     assert inputs["neighbour_acceleration"] == "Acceleration of the neighbouring axis, `q1`"
     assert inputs["neighbour_acceleration2"] == "Acceleration of the neighbouring axis, `q3`"
-    alone = [variable.name for variable in single[1].model().inputs]
-    assert alone == ["tau", "disturbance", "neighbour_acceleration"]
+    assert "neighbour_acceleration2" not in [variable.name for variable in single[1].model().inputs]
     x, p = np.zeros(2), [variable.start for variable in both.parameters()]
     speeds = [both.model().equations(0, x, [0, 0, *given], p)[0][1] for given in ((1, 0), (0, 1))]
     assert [float(one) for one in speeds] == pytest.approx([-0.2 / 0.3, -0.05 / 0.3])
@@ -254,7 +239,6 @@ def test_one_of_several_that_acts_alone_has_its_id_for_its_name_whatever_its_col
     assert (row.name, row.title, row.source) == ("axis_coupling", "Axis coupling", "joint 3 position")
     assert not any("axis_coupling:" in rule.name for one in answer.ledger for rule in one.rules)
     assert {one.effect for one in answer.ledger if one.effect.startswith("axis")} == {"axis_coupling"}
-    assert [one.effect for one in answer.scores.effects] == ["axis_coupling"] if answer.scores else False
 
 
 def test_of_two_that_move_in_proportion_one_is_named_and_the_other_said() -> None:

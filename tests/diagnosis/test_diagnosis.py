@@ -58,6 +58,9 @@ def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
     assert found.heldout.sliding["after_rms"] < 2.0 < 4.2 < found.heldout.sliding["before_rms"]
 
 
+Printed = pytest.CaptureFixture[str]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("night")
@@ -79,8 +82,8 @@ def valid(told: Any) -> Any:
     return told
 
 
-def test_a_diagnosis_writes_json_page_torques_fmus_and_an_improved_card(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_diagnosis_writes_json_page_torques_and_an_improved_card(
+    folder: Path, tmp_path: Path, capsys: Printed
 ) -> None:
     out = tmp_path / "out"
     assert asked(folder, out, "--json") == 0
@@ -99,7 +102,6 @@ def test_a_diagnosis_writes_json_page_torques_fmus_and_an_improved_card(
     rows = [pq.read_table(folder / f"{name}.parquet").num_rows for name in ("train_1", "train_2", "heldout")]
     assert pq.read_table(out / "missing_torque.parquet").num_rows == sum(rows)
     page = (out / "report.html").read_text()
-    assert "<html" in page
     assert "not passive" in printed["data_quality"][0]
     assert "Notes on the card, the recordings and the search" in page
     assert "it is not passive" in page
@@ -109,9 +111,7 @@ def test_a_diagnosis_writes_json_page_torques_fmus_and_an_improved_card(
     assert "exists already" in capsys.readouterr().err
 
 
-def test_quick_gives_the_same_answer_and_the_card_alone(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_quick_gives_the_same_answer_and_the_card_alone(folder: Path, tmp_path: Path, capsys: Printed) -> None:
     """Where a whole diagnosis lay, whose files would tell of another answer; one beside them is the user's."""
     (out := tmp_path / "quick").mkdir()
     (out / "diagnosis.json").write_text(json.dumps({"improved": {"fmu": "axis_improved.fmu"}}))
@@ -133,9 +133,7 @@ def test_quick_gives_the_same_answer_and_the_card_alone(
     assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}
 
 
-def test_the_held_out_recording_must_not_be_fitted(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_held_out_recording_must_not_be_fitted(folder: Path, tmp_path: Path, capsys: Printed) -> None:
     assert asked(folder, tmp_path / "out", held="train_1") == 2
     assert "held out" in capsys.readouterr().err
 

@@ -42,9 +42,8 @@ def tones(t: Array, seed: int, size: float) -> Joint:
     return Joint(*swing(t, [(size / k, f, p) for k, f, p in zip((1, 2, 4, 8), hertz, phases, strict=True)]))
 
 
-def slow_times() -> Array:
-    """Times at which a slow motion is recorded."""
-    return np.arange(0.0, 24.0, 0.01)
+SLOWLY = np.arange(0.0, 24.0, 0.01)
+"""Times at which a slow motion is recorded."""
 
 
 def slow(one: Joint) -> Joint:
@@ -52,39 +51,40 @@ def slow(one: Joint) -> Joint:
     return Joint(one.q, one.v / SLOW, one.a / SLOW**2)
 
 
-def still(t: Array) -> Joint:
-    """A joint that is held."""
-    return Joint(0.3 + 0 * t, 0 * t, 0 * t)
-
-
-def elbow(seed: int, neighbour: str = "tones", seconds: float = 12.0, columns: bool = True) -> Recording:
-    """A recording of the elbow, with the shoulder's position in column `q1`."""
-    t, dice = np.arange(0.0, seconds, 1 / 250), np.random.default_rng(seed)
-    own = tones(t, 10 + seed, 0.5)
-    other = {"tones": tones(t, 50 + seed, 0.7), "still": still(t), "alike": Joint(*(0.7 * one for one in own))}[
-        neighbour
-    ]
-    tau = OWN * (other.a + own.a) + LEVER * (np.cos(own.q) * other.a + np.sin(own.q) * other.v**2)
-    tau = tau + WEIGHT * np.sin(other.q + own.q) + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v
-    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
-    table |= {"q1": other.q + dice.normal(0, READING, len(t))} if columns else {}
+def taken(seed: int, t: Array, q: Array, tau: Array, others: Mapping[str, Array], noise: float = NOISE) -> Recording:
+    """What is read of a joint and of the positions of others."""
+    dice = np.random.default_rng([seed, 1])
+    table = {"t": t, "tau": tau + dice.normal(0, noise, len(t))}
+    table |= {name: one + dice.normal(0, READING, len(t)) for name, one in {"q": q, **others}.items()}
     return Recording.of(table, f"run {seed}")
+
+
+def rubbing(own: Joint) -> Array:
+    """Friction of a joint."""
+    return np.asarray(FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v)
+
+
+def elbow(seed: int, neighbour: str = "tones", columns: bool = True) -> Recording:
+    """A recording of the elbow, with the shoulder's position in column `q1`."""
+    t = np.arange(0.0, 12.0, 1 / 250)
+    own, held = tones(t, 10 + seed, 0.5), Joint(0.3 + 0 * t, 0 * t, 0 * t)
+    moves = {"tones": tones(t, 50 + seed, 0.7), "still": held, "alike": Joint(*(0.7 * one for one in own))}
+    other = moves[neighbour]
+    tau = OWN * (other.a + own.a) + LEVER * (np.cos(own.q) * other.a + np.sin(own.q) * other.v**2)
+    tau = tau + WEIGHT * np.sin(other.q + own.q) + rubbing(own)
+    return taken(seed, t, own.q, tau, {"q1": other.q} if columns else {})
 
 
 def joint(
     seed: int, acting: Mapping[int, tuple[float, float]], noise: float = 0.02, spare: float | None = None
 ) -> Recording:
-    """A joint among three neighbours `q1`, `q2`, `q3` that all move.
+    """A joint among three neighbours `q1`, `q2`, `q3` that all move, of which `acting` have h and w by their numbers.
 
         tau = .3 a + .5 sign(v) + .3 v + sum_n [ h_n a_n + w_n sin(q + q_n) ]
 
-    Args:
-        seed: of motion and noise.
-        acting: h_n and w_n of those neighbours that act, by their numbers.
-        noise: RMS of the torque's noise [N m].
-        spare: where given, `q2` moves as `q1` does, but for so much of a motion of its own.
+    Where `spare` is given, `q2` moves as `q1` does, but for so much of a motion of its own.
     """
-    t, dice = np.arange(0.0, 16.0, 1 / 250), np.random.default_rng(seed)
+    t = np.arange(0.0, 16.0, 1 / 250)
     own, *others = (tones(t, 1000 * seed + k, 0.8) for k in range(4))
     if spare is not None:
         others[1] = Joint(*(both + spare * one for both, one in zip(others[0], others[1], strict=True)))
@@ -92,13 +92,9 @@ def joint(
     for number, (inertia, weight) in acting.items():
         one = others[number - 1]
         tau = tau + inertia * one.a + weight * np.sin(own.q + one.q)
-    table = {"t": t, "tau": tau + dice.normal(0, noise, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
-    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in enumerate(others, 1)}
-    return Recording.of(table, f"run {seed}")
+    return taken(seed, t, own.q, tau, {f"q{k}": one.q for k, one in enumerate(others, 1)}, noise)
 
 
-LEVER_OF_FOREARM = 0.3
-"""Mass times distance from the axis [kg m]."""
 LINKS, TIP = (0.4, 0.3), (0.05, 0.6, 0.2)
 """Lengths of the two links before a wrist [m]; behind it inertia about its axis [kg m2], mass [kg], lever arm [m]."""
 
@@ -109,12 +105,9 @@ def wrist(seed: int, idle: int = 0) -> Recording:
         tau_3 = I (a_1 + a_2 + a_3) + m c (x'' cos(th) + y'' sin(th)) + m g c sin(th) + friction,  th = q_1 + q_2 + q_3
 
     (x, y) is where the wrist is, accelerated by both links before it: Newton and Euler's equations of the last link.
-
-    Args:
-        seed: of motion and noise.
-        idle: joints `q4` and so on that swing, too, and do nothing.
+    So many joints `q4` and so on swing, too, and are `idle`.
     """
-    t, dice = slow_times(), np.random.default_rng(seed)
+    t = SLOWLY
     shoulder, elbow, own, *others = (slow(tones(t / SLOW, 1000 * seed + 7 * k, 0.8)) for k in range(3 + idle))
     inertia, mass, lever = TIP
     ax, ay, angle, rate, turn = (0 * t for _ in range(5))
@@ -123,12 +116,9 @@ def wrist(seed: int, idle: int = 0) -> Recording:
         ax = ax + length * (np.cos(angle) * turn - np.sin(angle) * rate**2)
         ay = ay + length * (np.sin(angle) * turn + np.cos(angle) * rate**2)
     angle, turn = angle + own.q, turn + own.a
-    tau = inertia * turn + mass * lever * (np.cos(angle) * ax + np.sin(angle) * (ay + 9.81))
-    tau = tau + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v
-    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
-    moved = dict(zip((1, 2, *range(4, 4 + idle)), (shoulder, elbow, *others), strict=True))
-    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in moved.items()}
-    return Recording.of(table, f"run {seed}")
+    tau = inertia * turn + mass * lever * (np.cos(angle) * ax + np.sin(angle) * (ay + 9.81)) + rubbing(own)
+    moved = {"q1": shoulder.q, "q2": elbow.q, **{f"q{k}": one.q for k, one in enumerate(others, 4)}}
+    return taken(seed, t, own.q, tau, moved)
 
 
 def forearm(seed: int) -> Recording:
@@ -137,20 +127,11 @@ def forearm(seed: int) -> Recording:
     Its torque is that of the weight about the axis, r x F turned by the rotations of the three joints; nothing else
     of the links has mass. The joint about y swings about .8 rad: at 0 the others are parallel.
     """
-    t, dice = slow_times(), np.random.default_rng(seed)
-    shoulder, twist, own = (slow(tones(t / SLOW, 1000 * seed + 7 * k, 0.8)) for k in range(3))
+    shoulder, twist, own = (slow(tones(SLOWLY / SLOW, 1000 * seed + 7 * k, 0.8)) for k in range(3))
     twist = Joint(0.8 + twist.q, twist.v, twist.a)
     along, across = (Rotation.from_euler(a, one.q[:, None]) for a, one in (("x", shoulder), ("y", twist)))
     turned = along * across * Rotation.from_euler("x", own.q[:, None])
-    torque = np.cross(turned.apply([0.0, LEVER_OF_FOREARM, 0.0]), [0.0, 0.0, -9.81])
+    torque = np.cross(turned.apply([0.0, 0.3, 0.0]), [0.0, 0.0, -9.81])
     axis = (along * across).apply([1.0, 0.0, 0.0])
-    tau = OWN * own.a + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v - np.sum(axis * torque, axis=1)
-    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
-    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in ((1, shoulder), (2, twist))}
-    return Recording.of(table, f"run {seed}")
-
-
-def coupling() -> float:
-    """Mean of what the shoulder's acceleration needs at the elbow [kg m2]."""
-    q = np.concatenate([tones(np.arange(0.0, 12.0, 1 / 250), 10 + seed, 0.5).q for seed in (1, 2)])
-    return float(OWN + LEVER * np.mean(np.cos(q)))
+    tau = OWN * own.a + rubbing(own) - np.sum(axis * torque, axis=1)
+    return taken(seed, SLOWLY, own.q, tau, {"q1": shoulder.q, "q2": twist.q})

@@ -1,4 +1,6 @@
-"""Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does.
+"""What lies between the drive and the reading: delays, lags, clocks and springs.
+
+Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does.
 
 Between a late torque and a late reading the reading's own lag behind the set point decides.
 """
@@ -9,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from problems import compared
+from effect_examples import linear, mount
+from problems import compared, problem_of
 from wandering import axis, swing
 from wandering import recorded as read
 
@@ -19,17 +22,21 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
+from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
 from cosim.diagnosis.search.stages import admission, margin, refitted
+from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.friction import LuGre
-from pyfmi_models.mount import Mount
+from pyfmi_models.friction import Coulomb, Frictionless, LuGre
+from pyfmi_models.mount import Axis, Mount
 
 BASE = axis(Fc=0.5)
 Drive = Delay | ActuatorLag
@@ -119,9 +126,7 @@ def test_what_makes_a_torque_late_says_by_how_many_seconds(effect: Effect, secon
         (ActuatorLag(time_constant_ms=0.1), 0.0, True),  # less than time stamps can be trusted for
     ],
 )
-def test_a_lag_is_no_clocks_where_it_lies_in_the_drive_and_no_drives_where_it_lies_in_the_clocks(
-    effect: Effect, trails: float, degenerate: bool
-) -> None:
+def test_a_lag_lies_in_the_drive_or_in_the_clocks(effect: Effect, trails: float, degenerate: bool) -> None:
     problem: Any = SimpleNamespace(seconds=40.0, sample_time=1e-3, prepared=trailing(trails))
     assert hypothesis_of(effect).is_degenerate(problem, effect) is degenerate
 
@@ -146,9 +151,7 @@ def recorded(effect: Effect, noise: float, seed: int, ripple: float) -> Recordin
     [(Presliding(sigma0=1000.0), 0.1, 0.0), (Delay(delay_ms=5.0), 0.02, 0.03)],
     ids=["a contact that bends", "a delay"],
 )
-def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
-    effect: Effect, noise: float, ripple: float
-) -> None:
+def test_only_the_one_that_is_there_is_admissible_and_near(effect: Effect, noise: float, ripple: float) -> None:
     comparison, base = compared(_problem([recorded(effect, noise, seed, ripple) for seed in (1, 2)], CARD), 40)
     fits = {one.id: refitted(comparison, base, one, 1) for one in STARTS}
     own = fits[effect.id]
@@ -166,9 +169,7 @@ def offered(prepared: Prepared, mount: Mount, *effects: Effect) -> set[str]:
 
 
 @pytest.mark.parametrize(("mount", "both"), [(axis(), False), (replace(axis(), friction=LUGRE), True)])
-def test_an_offset_and_an_asymmetry_are_offered_beside_each_other_only_where_rest_tells_them_apart(
-    mount: Mount, both: bool
-) -> None:
+def test_an_offset_and_an_asymmetry_are_offered_together_where_rest_tells_them_apart(mount: Mount, both: bool) -> None:
     t = np.arange(4_000) / 200
     v = 0.2 * np.cos(0.9 * t)
     prepared = prepare([read(2 * np.sign(v) + v, t, np.cumsum(v) / 200)], 10.0)
@@ -176,3 +177,85 @@ def test_an_offset_and_an_asymmetry_are_offered_beside_each_other_only_where_res
     assert {"torque_offset", "friction_asymmetry"} <= offered(prepared, mount)
     assert ("friction_asymmetry" in offered(prepared, mount, TorqueOffset(torque=0.3))) is both
     assert ("torque_offset" in offered(prepared, mount, sides)) is both
+
+
+# A spring between the drive and the encoder, or behind the encoder. Recordings are closed forms: at a steady advance
+# with tones on it, s = 2 pi i f, with L the torque that the load needs,
+#
+#     load side:   motor = q + L / (k + d s),   tau = J_motor s^2 motor + L,   L = (J_load s^2 + sigma2 s) q
+#     motor side:  tau = (J_motor s^2 + sigma2 s) q + J_load s^2 (k + d s) / (J_load s^2 + d s + k) q
+
+BELIEVED = Mount(name="m", axis=Axis(inertia=27.0), friction=Coulomb(Fc=2.0, sigma2=40.0))
+SHARE, DAMPING = 0.65, 0.03
+"""Share of the inertia on the load, and d / k = 2 `DAMPING` / (2 pi fr)."""
+
+
+def test_springs_before_and_behind_the_axis_are_a_chain_in_whatever_order_they_are_written() -> None:
+    springs = LoadSideCompliance(resonance_hz=25.0, encoder_share=0.6), Compliance(antiresonance_hz=50, resonance_hz=60)
+    first, second = (linear(mount(*some, friction=Frictionless()).model())[0] for some in (springs, springs[::-1]))
+    np.testing.assert_allclose(*(np.sort_complex(np.linalg.eigvals(one)) for one in (first, second)), atol=1e-6)
+
+
+def needed(s: np.ndarray, hertz: float, side: str) -> np.ndarray:
+    """Torque per position of two masses whose resonance this is, at complex frequencies."""
+    total, oil = 30.0, 30.0
+    load, motor = SHARE * total, (1 - SHARE) * total
+    spring = load * motor / total * (2 * np.pi * hertz) ** 2 * (1 + 2 * DAMPING / (2 * np.pi * hertz) * s)
+    if side == "motor":
+        return motor * s**2 + oil * s + load * s**2 * spring / (load * s**2 + spring)
+    on_load = load * s**2 + oil * s
+    return motor * s**2 * (1 + on_load / spring) + on_load
+
+
+def rung(hertz: float, side: str, seed: int) -> Recording:
+    """A steady advance of 0.2 rad/s with tones up to 30 Hz, and the noise of a good encoder and a drive."""
+    rng, t = np.random.default_rng(seed), np.arange(20_000) / 1000
+    f = np.array([0.3, 0.7, 1.9, 4.1, 7.3, 11.0, 16.0, 21.0, 26.0, 30.0])
+    size, phase, s = 0.3 / (2 * np.pi * np.maximum(f, 2.0)) ** 2, rng.uniform(0, 2 * np.pi, len(f)), 2j * np.pi * f
+    waves = size * np.exp(s * t[:, None] + 1j * phase)
+    torque = 2.5 + 30.0 * 0.2 + (waves * needed(s, hertz, side)).sum(axis=1).imag
+    q = 0.2 * t + waves.sum(axis=1).imag
+    return read(torque + rng.normal(0, 0.02, len(t)), t, q + rng.normal(0, 1e-8, len(t)), f"{side} {seed}")
+
+
+def problem(hertz: float, side: str) -> tuple[Problem, Fit]:
+    """Two recordings of such a machine, and the fit of the rigid axis."""
+    found = problem_of(BELIEVED, *(rung(hertz, side, seed) for seed in (1, 2)), cutoff=40.0, slow=0.0, sample=1e-3)
+    return found, found.fit(BELIEVED, 25)
+
+
+def energy(given: Problem, base: Fit, *effects: Effect) -> tuple[float, Effect]:
+    """Share of the rigid axis' residual energy that the best of these starts leaves, and what it came to."""
+    fits = [given.fit(replace(base.mount, effects=(one,)), 40) for one in effects]
+    best = min(fits, key=given.error)
+    return (given.error(best) / given.error(base)) ** 2, best.mount.effects[0]
+
+
+FORMS = {
+    "load": [LoadSideCompliance(resonance_hz=hertz, encoder_share=0.5) for hertz in (35.0, 90.0)],
+    "motor": [Compliance(antiresonance_hz=hertz, resonance_hz=1.2 * hertz) for hertz in (15.0, 30.0)],
+}
+
+
+@pytest.mark.parametrize(
+    ("hertz", "side", "other"), [(32, "load", "motor"), (120, "load", "motor"), (40, "motor", "load")]
+)
+def test_a_fit_finds_the_resonance_of_the_right_form(hertz: float, side: str, other: str) -> None:
+    given, base = problem(hertz, side)
+    left, found = energy(given, base, *FORMS[side])
+    numbers = {"resonance_hz": hertz, **({"antiresonance_hz": hertz * np.sqrt(1 - SHARE)} if side == "motor" else {})}
+    assert {name: getattr(found, name) for name in numbers} == pytest.approx(numbers, rel=0.05)
+    assert getattr(found, "encoder_share", 0.5) == 0.5, "left as it was"
+    assert left < 0.05
+    assert energy(given, base, *FORMS[other])[0] > 4 * left
+
+
+def test_a_spring_that_only_the_reversals_of_friction_show_is_none() -> None:
+    """A slow motion to and fro asks nothing of a spring but to be wound up by friction, again and again."""
+    t = np.arange(20_000) / 1000
+    q, v = 0.2 * np.sin(2.0 * t), 0.4 * np.cos(2.0 * t)
+    torque = -30.0 * 0.8 * np.sin(2.0 * t) + 2.5 * np.sign(v) + 30.0 * v
+    slow = problem_of(BELIEVED, read(torque, t, q), cutoff=40.0, slow=0.0, sample=1e-3)
+    spring = LoadSideCompliance(resonance_hz=90.0, encoder_share=0.5)
+    assert is_degenerate(slow, spring)
+    assert not is_degenerate(problem(90.0, "load")[0], spring)
