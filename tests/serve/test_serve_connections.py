@@ -26,21 +26,22 @@ FEW = Limits(files=3, job=60_000, file=40_000)
 
 
 @contextmanager
-def served(home: Path, work: Any, limits: Limits | None = None) -> Iterator[tuple[Desk, int]]:
+def served(home: Path, work: Any, limits: Limits | None = None) -> Iterator[tuple[Desk, int, str]]:
+    """A desk, its port, and the address of a draft."""
     with desk_at(home, work, limits) as desk, listened(desk) as port:
-        yield desk, port
+        yield desk, port, new(client_of(desk))
         while LINES:
             LINES.pop().close()
 
 
 @pytest.fixture
-def there(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
+def there(tmp_path: Path) -> Iterator[tuple[Desk, int, str]]:
     with served(tmp_path / "data", serve_work.quickly) as made:
         yield made
 
 
 @pytest.fixture
-def slow(tmp_path: Path) -> Iterator[tuple[Desk, int]]:
+def slow(tmp_path: Path) -> Iterator[tuple[Desk, int, str]]:
     with served(tmp_path / "data", serve_work.for_ever, FEW) as made:
         yield made
 
@@ -75,12 +76,12 @@ def head_of(port: int, method: str, path: str) -> str:
 
 
 def test_many_connections_that_say_nothing_do_not_silence_the_page(
-    there: tuple[Desk, int],
+    there: tuple[Desk, int, str],
     capfd: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    _, port = there
+    port = there[1]
     monkeypatch.setattr(connection, "MOST", 16)
     texts = ("", "GET / HTTP/1.1\nHost: ", "GET / HT")
     lines = [line(port, text) for _ in range(connection.MOST) for text in texts]
@@ -98,10 +99,9 @@ def test_many_connections_that_say_nothing_do_not_silence_the_page(
     ids=["a head", "chunks", "a body of stated size"],
 )
 def test_what_does_not_get_on_is_ended_and_leaves_nothing(
-    there: tuple[Desk, int], said: str, part: bytes, monkeypatch: pytest.MonkeyPatch
+    there: tuple[Desk, int, str], said: str, part: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk, port = there
-    job = new(client_of(desk))
+    desk, port, job = there
     for name, seconds in {"HEAD": 0.5, "STALLED": 0.5, "LOOK": 0.1}.items():
         monkeypatch.setattr(connection, name, seconds)
     slow = line(port, head_of(port, "PUT", f"{job}/files?name=a.csv") + said)
@@ -118,8 +118,8 @@ def test_what_does_not_get_on_is_ended_and_leaves_nothing(
     assert not desk.store.all()[0].uploads
 
 
-def test_an_answer_that_nobody_takes_is_ended(there: tuple[Desk, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    desk, port = there
+def test_an_answer_that_nobody_takes_is_ended(there: tuple[Desk, int, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    desk, port, _ = there
     monkeypatch.setattr(connection, "STALLED", 0.5)
     monkeypatch.setattr(connection, "LOOK", 0.1)
     job = desk.store.new()
@@ -136,9 +136,8 @@ def test_an_answer_that_nobody_takes_is_ended(there: tuple[Desk, int], monkeypat
     assert taken < 30_000_000
 
 
-def test_a_body_that_gets_on_slowly_arrives(there: tuple[Desk, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    desk, port = there
-    job = new(client_of(desk))
+def test_a_body_that_gets_on_slowly_arrives(there: tuple[Desk, int, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    _, port, job = there
     monkeypatch.setattr(connection, "STALLED", 3.0)
     monkeypatch.setattr(connection, "LEAST", 10)
     monkeypatch.setattr(connection, "LOOK", 0.1)
@@ -160,9 +159,9 @@ def test_a_body_that_gets_on_slowly_arrives(there: tuple[Desk, int], monkeypatch
     ],
 )
 def test_what_is_no_request_is_refused_and_says_nothing_in_the_terminal(
-    there: tuple[Desk, int], text: str, capfd: pytest.CaptureFixture[str]
+    there: tuple[Desk, int, str], text: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    _, port = there
+    port = there[1]
     for _ in range(5):
         with suppress(ConnectionError):  # the rest of it was not read
             assert line(port, text).recv(100).startswith(b"HTTP/1.1 4")
@@ -221,10 +220,9 @@ def whole(desk: Desk, job: str) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("stated", [True, False])
 def test_of_two_uploads_of_one_name_the_first_arrives_whole_and_the_second_is_refused(
-    slow: tuple[Desk, int], stated: bool
+    slow: tuple[Desk, int, str], stated: bool
 ) -> None:
-    desk, port = slow
-    job = new(client_of(desk))
+    desk, port, job = slow
     first, second = recording(300, 1), recording(500, 2)
     one = Upload(port, job, "a.csv", first, stated)
     until(lambda: on_their_way(desk, job) == 1)
@@ -235,9 +233,8 @@ def test_of_two_uploads_of_one_name_the_first_arrives_whole_and_the_second_is_re
     assert on_their_way(desk, job) == 0
 
 
-def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow: tuple[Desk, int]) -> None:
-    desk, port = slow
-    job = new(client_of(desk))
+def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow: tuple[Desk, int, str]) -> None:
+    desk, port, job = slow
     answers: list[int] = []
 
     def put(number: int) -> None:
@@ -249,9 +246,8 @@ def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow:
 
 
 @pytest.mark.parametrize("stated", [True, False])
-def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int], stated: bool) -> None:
-    desk, port = slow
-    job = new(client_of(desk))
+def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int, str], stated: bool) -> None:
+    desk, port, job = slow
     content = b"t,tau,q\n" + b"1,2,3\n" * 5800
     assert len(content) < FEW.file < FEW.job < 2 * len(content)
     first, second = (Upload(port, job, f"{name}.csv", content, stated) for name in "ab")
@@ -262,8 +258,8 @@ def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int], 
     assert Upload(port, job, "c.csv", recording(30)).finish()[0] == 201, "what was refused leaves its place"
 
 
-def test_an_upload_that_ends_after_the_start_does_not_change_the_diagnosis(slow: tuple[Desk, int]) -> None:
-    desk, port = slow
+def test_an_upload_that_ends_after_the_start_does_not_change_the_diagnosis(slow: tuple[Desk, int, str]) -> None:
+    desk, port, _ = slow
     client = client_of(desk)
     job = ready(client)
     late = Upload(port, job, "late.csv", recording(900))
@@ -280,10 +276,10 @@ def test_an_upload_that_ends_after_the_start_does_not_change_the_diagnosis(slow:
 
 @pytest.mark.parametrize("work", ["look", "card"])
 def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(
-    slow: tuple[Desk, int], work: str, monkeypatch: pytest.MonkeyPatch
+    slow: tuple[Desk, int, str], work: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Looking takes seconds; whoever presses the button meanwhile has started what was there."""
-    desk, _ = slow
+    desk = slow[0]
     client = client_of(desk)
     job = ready(client)
     reads = getattr(desk.reader, work)
@@ -302,20 +298,17 @@ def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(
     assert (desk.views(state_of(desk, job)), desk.card_text(state_of(desk, job))) == before
 
 
-def test_a_job_that_is_removed_while_a_file_comes_leaves_nothing(slow: tuple[Desk, int]) -> None:
-    desk, port = slow
-    client = client_of(desk)
-    job = new(client)
+def test_a_job_that_is_removed_while_a_file_comes_leaves_nothing(slow: tuple[Desk, int, str]) -> None:
+    desk, port, job = slow
     late = Upload(port, job, "late.csv", recording(900))
     until(lambda: on_their_way(desk, job) == 1)
-    act(client, job, "remove")
+    act(client_of(desk), job, "remove")
     assert late.finish()[0] == 400
     assert [*desk.store.home.iterdir()] == []
 
 
-def test_a_file_of_which_the_rest_never_comes_leaves_its_place(slow: tuple[Desk, int]) -> None:
-    desk, port = slow
-    job = new(client_of(desk))
+def test_a_file_of_which_the_rest_never_comes_leaves_its_place(slow: tuple[Desk, int, str]) -> None:
+    desk, port, job = slow
     torn = Upload(port, job, "a.csv", recording(900))
     until(lambda: on_their_way(desk, job) == 1)
     torn.line.close()
@@ -323,8 +316,8 @@ def test_a_file_of_which_the_rest_never_comes_leaves_its_place(slow: tuple[Desk,
     assert Upload(port, job, "a.csv", recording()).finish() == (201, "")
 
 
-def test_of_two_starts_at_once_one_counts(slow: tuple[Desk, int]) -> None:
-    desk, _ = slow
+def test_of_two_starts_at_once_one_counts(slow: tuple[Desk, int, str]) -> None:
+    desk = slow[0]
     job = ready(client_of(desk))
     told: list[str] = []
 
