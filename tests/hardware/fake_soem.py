@@ -78,6 +78,7 @@ class Master:
     count = 1
     goes_up = True
     refused: tuple[int, int] | None = None
+    more, safe = (0, 0), SAFEOP_STATE
     change: Callable[["Master", int], Any] | None = None
 
     def __init__(self) -> None:
@@ -99,8 +100,8 @@ class Master:
         assert slave.config_func is not None
         slave.config_func(0)
         sizes = {side: sum(size for _, size in slave.mapped(side)) for side in (0x1C12, 0x1C13)}
-        slave.output, slave.input = bytes(sizes[0x1C12]), bytes(sizes[0x1C13])
-        slave.state = SAFEOP_STATE
+        slave.output, slave.input = bytes(sizes[0x1C12] + self.more[0]), bytes(sizes[0x1C13] + self.more[1])
+        slave.state = self.safe
         return sum(sizes.values())
 
     def config_dc(self) -> bool:

@@ -135,6 +135,9 @@ def test_a_drive_that_is_enabled_in_another_mode_is_a_fault(tmp_path: Path, bus:
         ({"position": 3}, {}, "no slave 3 at fake0, which has 1"),
         ({"rated_torque": 100.1}, {}, r"limits.torque_mismatch = 0.1 N m is below what the drive counts"),
         ({"rated_torque": 50 / 32.7671}, {}, r"limits.torque = 50 N m does not fit into 16 bits of 0.0015"),
+        ({}, {"more": (1, 0)}, "has 6 bytes of outputs and the mapping 5"),
+        ({}, {"more": (0, -1)}, "has 8 bytes of inputs and the mapping 9"),
+        ({}, {"safe": fake_soem.PREOP_STATE}, "does not reach safe operation of the bus: No error"),
         ({}, {"refused": (0x1600, 2)}, "refuses its PDOs: RuntimeError abort 0x06090030"),
     ],
 )
