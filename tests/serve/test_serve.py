@@ -2,12 +2,14 @@
 
 import os
 import re
+import signal
 import socket
 import stat
 import subprocess
 import sys
 from pathlib import Path
 
+import httpx2
 import pytest
 from mortal import mortal
 from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording
@@ -106,14 +108,26 @@ def children(pid: int) -> list[int]:
     return [int(one) for path in found for one in path.read_text().split()]
 
 
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
 @pytest.mark.skipif(not Path("/proc").exists(), reason="processes are looked up in /proc")
-@pytest.mark.parametrize("sign", ["SIGKILL", "SIGTERM", "SIGINT"])
-def test_the_server_prints_its_address_and_takes_its_processes_with_it(tmp_path: Path, sign: str) -> None:
-    import signal
-
-    import httpx2
-
-    process, address = begun(tmp_path / "data")
+@pytest.mark.parametrize(
+    ("sign", "code", "before", "who"),
+    [
+        ("SIGKILL", -9, 0o775, "everybody"),
+        ("SIGTERM", 143, 0o750, "its group"),
+        ("SIGINT", 130, 0o700, ""),
+    ],
+)
+def test_the_server_prints_its_address_and_takes_its_processes_with_it_and_leaves_its_folder_as_it_was(
+    tmp_path: Path, sign: str, code: int, before: int, who: str
+) -> None:
+    home = tmp_path / "project"
+    home.mkdir()
+    home.chmod(before)
+    process, address = begun(home)
     try:
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{30,}", address)
         assert httpx2.get(address, follow_redirects=True).status_code == 200
@@ -124,8 +138,9 @@ def test_the_server_prints_its_address_and_takes_its_processes_with_it(tmp_path:
         until(lambda: not any(map(alive, own)), 8)
     finally:
         process.kill()
-        process.communicate()
-    assert process.returncode == {"SIGKILL": -9, "SIGTERM": 143, "SIGINT": 130}[sign]
+        said = process.communicate()[1]
+    assert (process.returncode, mode(home)) == (code, before)
+    assert (f"{home} can be entered by {who}" in said) == bool(who)
 
 
 def test_this_machine_alone_is_listened_to_and_a_taken_port_is_a_sentence() -> None:
@@ -165,10 +180,6 @@ def test_the_verb_imports_the_server_only_when_it_is_called() -> None:
 # The way in: no token in an argument of a browser, and no folder that is closed unasked
 
 
-def mode(path: Path) -> int:
-    return stat.S_IMODE(path.stat().st_mode)
-
-
 @POSIX
 def test_the_browser_is_opened_with_a_file_that_its_owner_alone_can_read_and_that_leads_to_the_address(
     tmp_path: Path,
@@ -205,22 +216,6 @@ def test_the_file_leads_to_the_address_by_hand_too_and_what_lies_at_its_place_is
     assert other.read_text("utf-8") == "kept"
     with door(tmp_path / "nowhere", "http://127.0.0.1:1/?token=x") as path:
         assert path is None
-
-
-@POSIX
-@pytest.mark.parametrize(("before", "who"), [(0o775, "everybody"), (0o750, "its group"), (0o700, "")])
-def test_a_folder_that_is_there_keeps_its_mode_and_that_is_said(tmp_path: Path, before: int, who: str) -> None:
-    home = tmp_path / "project"
-    home.mkdir()
-    home.chmod(before)
-    process, _ = begun(home)
-    try:
-        assert mode(home) == before
-    finally:
-        process.terminate()
-        said = process.communicate(timeout=60)[1]
-    assert mode(home) == before
-    assert (f"{home} can be entered by {who}" in said) == bool(who)
 
 
 @POSIX
