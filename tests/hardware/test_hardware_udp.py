@@ -172,15 +172,6 @@ def test_a_loop_that_is_alive_and_a_port_that_is_taken_are_not_pushed_aside(tmp_
             pass
 
 
-def test_a_drive_that_is_not_there_is_refused_in_a_sentence(tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with pytest.raises(HardwareError, match=rf"No drive at udp://127.0.0.1:{port}: connection refused"):
-        session(tmp_path, f"udp://127.0.0.1:{port}")
-    assert not (tmp_path / "box").exists()
-
-
 @pytest.mark.parametrize(
     ("reply", "sentence"),
     [
@@ -195,12 +186,7 @@ def test_what_is_no_drive_is_refused_in_a_sentence(
 ) -> None:
     with replying(reply) as url, pytest.raises(HardwareError, match=sentence):
         session(tmp_path, url)
-
-
-@pytest.mark.parametrize("url", ["udp://127.0.0.1", "udp://:4020", "udp://127.0.0.1:x", "tcp://127.0.0.1:4020"])
-def test_an_adapter_that_is_none_is_refused(url: str) -> None:
-    with pytest.raises(HardwareError, match='an adapter is "simulated" or "udp://HOST:PORT" or'):
-        over(url)
+    assert not (tmp_path / "box").exists()
 
 
 @pytest.mark.parametrize(
@@ -273,7 +259,7 @@ def test_the_commands_check_and_run_over_udp(tmp_path: Path) -> None:
         assert "duplicated" in done.output
     done = invoke("check", str(tmp_path / "s.toml"), "--drive", there.url)
     assert done.exit_code == 2
-    assert "No drive at" in done.output
+    assert f"No drive at {there.url}: connection refused" in " ".join(done.output.split())
 
 
 def test_a_drive_of_a_card_has_the_cards_encoder() -> None:

@@ -101,6 +101,10 @@ BEGUN = 'name = "x"\nadapter = "simulated"\n'
         ),
         (BEGUN, '"limits" is missing'),
         (f'name = "x"\nadapter = "wireless"{LIMITED}', "adapter = 'wireless' breaks a rule"),
+        *(
+            (f'name = "x"\nadapter = "{url}"{LIMITED}', 'an adapter is "simulated" or "udp://HOST:PORT" or')
+            for url in ("udp://127.0.0.1", "udp://:4020", "udp://127.0.0.1:x", "tcp://127.0.0.1:4020")
+        ),
         (f"{BEGUN}heat = 1{LIMITED}", '"heat" is no key of a machine; keys there are: name'),
         (f"{BEGUN}[limits]\ntorque = 50.0", '"limits.slew" is missing'),
         ("name = ", "not valid TOML"),

@@ -258,20 +258,24 @@ def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int, s
     assert Upload(port, job, "c.csv", recording(30)).finish()[0] == 201, "what was refused leaves its place"
 
 
-def test_an_upload_that_ends_after_the_start_does_not_change_the_diagnosis(slow: tuple[Desk, int, str]) -> None:
-    desk, port, _ = slow
+def test_an_upload_that_ends_after_the_start_or_the_end_of_a_job_does_not_change_it(
+    slow: tuple[Desk, int, str],
+) -> None:
+    desk, port, removed = slow
     client = client_of(desk)
     job = ready(client)
-    late = Upload(port, job, "late.csv", recording(900))
-    until(lambda: on_their_way(desk, job) == 1)
+    late, gone = (Upload(port, one, "late.csv", recording(900)) for one in (job, removed))
+    until(lambda: on_their_way(desk, job) == on_their_way(desk, removed) == 1)
     act(client, job, "start")
+    act(client, removed, "remove")
     until(lambda: desk.queue.progress.answer)
     status, problem = late.finish()
-    assert status == 400
-    assert "started before this file had come" in problem
+    assert (status, "started before this file had come" in problem) == (400, True)
+    assert gone.finish()[0] == 400
     assert [one.name for one in state_of(desk, job).uploads] == ["run1.csv", "heldout.csv"]
     assert set(whole(desk, job)) == {"run1.csv", "heldout.csv"}
     assert on_their_way(desk, job) == 0
+    assert [one.name for one in desk.store.home.iterdir()] == [id_of(job)]
 
 
 @pytest.mark.parametrize("work", ["look", "card"])
@@ -296,15 +300,6 @@ def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(
     assert (answer.status_code, "cannot be changed now" in answer.text) == (400, True)
     assert not any(one.options.get("units") for one in state_of(desk, job).uploads)
     assert (desk.views(state_of(desk, job)), desk.card_text(state_of(desk, job))) == before
-
-
-def test_a_job_that_is_removed_while_a_file_comes_leaves_nothing(slow: tuple[Desk, int, str]) -> None:
-    desk, port, job = slow
-    late = Upload(port, job, "late.csv", recording(900))
-    until(lambda: on_their_way(desk, job) == 1)
-    act(client_of(desk), job, "remove")
-    assert late.finish()[0] == 400
-    assert [*desk.store.home.iterdir()] == []
 
 
 def test_a_file_of_which_the_rest_never_comes_leaves_its_place(slow: tuple[Desk, int, str]) -> None:
