@@ -16,7 +16,6 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
-from alpaca_mount import ARCSEC, simulated
 from alpaca_rules import BASE
 from mortal import mortal
 from test_alpaca_rules import ask
@@ -34,12 +33,13 @@ from cosim_observatory.pointing import HORIZON, DeviceError, Pointing
 from cosim_observatory.sky import equatorial, horizontal, sidereal_time
 from cosim_observatory.telescope import HOURS, TURN, Telescope, _hours
 
+ARCSEC = 1 / 3600
 PATIENCE = 300.0
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with simulated() as mount, Server(mount, port=0, discovery=0) as one:
+def server(mount: Telescope) -> Iterator[Server]:
+    with Server(mount, port=0, discovery=0) as one:
         yield one
 
 

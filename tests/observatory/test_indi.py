@@ -8,20 +8,21 @@ from contextlib import closing
 from time import sleep
 
 import pytest
-from alpaca_mount import ARCSEC, simulated
 from mortal import mortal
 from waiting import until
 
 from cosim.support.errors import OutputError
 from cosim_observatory.indi import CLIENTS, IndiServer
 from cosim_observatory.properties import number
+from cosim_observatory.telescope import Telescope
 
+ARCSEC = 1 / 3600
 DEVICE = "mount-cosim simulated mount"
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[IndiServer]:
-    with simulated() as telescope, IndiServer(telescope, port=0) as one:
+def server(mount: Telescope) -> Iterator[IndiServer]:
+    with IndiServer(mount, port=0) as one:
         yield one
 
 

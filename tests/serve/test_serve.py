@@ -24,7 +24,7 @@ from cosim_serve.desk import Desk
 from cosim_serve.door import NAME, door
 from cosim_serve.job import Upload
 from cosim_serve.server import listening
-from cosim_serve.work import Order, command, diagnose_order
+from cosim_serve.work import Order, diagnose_order
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="modes and /proc")
 
@@ -227,16 +227,6 @@ def test_what_the_page_makes_is_closed_to_others(tmp_path: Path, desk: Desk) -> 
 
 
 # The diagnosis itself
-
-
-def test_the_command_line_that_does_the_same_is_written_down(tmp_path: Path) -> None:
-    said = {"columns": {"tau": "the force"}, "units": {"q": "deg"}, "layout": {}}
-    uploads = (Upload(name="run 1.csv", size=1, options=said), Upload(name="b.csv", size=1, role="heldout"))
-    order = Order(uploads, tmp_path, tmp_path / "card.toml", "axis.toml", tmp_path / "out")
-    assert command(order) == (
-        "cosim diagnose 'run 1.csv' --heldout b.csv --card axis.toml --columns 'run 1.csv:tau=the force' "
-        "--units 'run 1.csv:q=deg' --out result"
-    )
 
 
 def test_a_diagnosis_names_files_as_the_user_knows_them(tmp_path: Path) -> None:

@@ -279,16 +279,16 @@ def test_each_recording_of_a_file_is_an_entry_that_waits_for_its_use(client: Tes
 
 def test_they_are_diagnosed_and_the_command_line_takes_the_same(client: TestClient, desk: Desk) -> None:
     job = new(client)
-    put(client, job, "day.csv", day())
+    put(client, job, "a day.csv", day())
     put(client, job, "axis.toml", CARD.encode())
-    act(client, job, "correct", file="day.csv:run=0", role="train", **{"columns.tau": "tau", "units.tau": "mN.m"})
-    act(client, job, "role", file="day.csv:run=2", role="heldout")
+    act(client, job, "correct", file="a day.csv:run=0", role="train", **{"columns.tau": "tau", "units.tau": "mN.m"})
+    act(client, job, "role", file="a day.csv:run=2", role="heldout")
     there = state_of(desk, job)
     assert desk.lacking(there) == []
     order = job_order(there, desk.store.recording(there, ""), desk.store.card(there), desk.store.result(there.id))
     assert command(order) == (
-        "cosim diagnose day.csv:run=0 --heldout day.csv:run=2 --card axis.toml --columns day.csv:tau=tau "
-        "--units day.csv:tau=mN.m --out result"
+        "cosim diagnose 'a day.csv:run=0' --heldout 'a day.csv:run=2' --card axis.toml "
+        "--columns 'a day.csv:tau=tau' --units 'a day.csv:tau=mN.m' --out result"
     )
 
 
