@@ -212,11 +212,9 @@ class Grease(MemorylessLaw):
     tilt: Scalar = parameter("1", "Of no consequence here", default=0.3)
 
     def level(self, v: Scalar) -> Scalar:
-        """Fc."""
         return self.Fc
 
     def viscous(self, v: Scalar) -> Scalar:
-        """K |v|^n."""
         return self.K * v * ca.exp((self.n - 1) / 2 * ca.log(v * v + 1e-12))
 
 

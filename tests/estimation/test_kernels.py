@@ -1,6 +1,7 @@
 """The kernels in C do what NumPy and SciPy do, on any rows, and without them a diagnosis computes the same."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import ceil
 from types import SimpleNamespace
 from typing import Any
@@ -234,14 +235,9 @@ def test_a_column_that_is_twice_another_does_not_hide_the_best_signs() -> None:
 
 DT = 1e-3
 PLAY = Backlash(gap_rad=1e-3, load_friction=0.3, load_viscous=0.1)
-SEVERAL = [
-    PLAY,
-    Backlash(gap_rad=0.0, load_friction=0.0),
-    *(
-        Backlash(gap_rad=gap, load_friction=2.0, contact_hz=20.0, load_deflection=1e-3)
-        for gap in np.geomspace(1e-4, 1, 9)
-    ),
-]
+SOFT = Backlash(gap_rad=1.0, load_friction=2.0, contact_hz=20.0, load_deflection=1e-3)
+NO_GAP = Backlash(gap_rad=0.0, load_friction=0.0)
+SEVERAL = [PLAY, NO_GAP, *(replace(SOFT, gap_rad=gap) for gap in np.geomspace(1e-4, 1, 9))]
 
 
 def moved() -> tuple[np.ndarray, np.ndarray]:

@@ -271,10 +271,8 @@ def evaluated(mount: Mount = RIPPLED) -> list[np.ndarray]:
     equations = Equations(mount, FREE, ("a structure", *map(type, mount.components().values())))
     columns = [np.linspace(0, 1, 50) + k for k in range(9)]
     numbers = np.array([variable.start for variable in mount.parameters()])
-    return [
-        equations.torque(columns[:6], numbers),
-        *(one.rows([*columns, columns[0]], numbers) for one in equations._affine),
-    ]
+    affine = [one.rows([*columns, columns[0]], numbers) for one in equations._affine]
+    return [equations.torque(columns[:6], numbers), *affine]
 
 
 def test_what_is_on_the_disk_gives_the_same_bits(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

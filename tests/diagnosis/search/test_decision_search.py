@@ -101,6 +101,8 @@ def test_an_effect_without_evidence_beside_the_others_goes_and_the_last_one_stay
     assert names_of(play("xy", {"x": 50.0, "y": 8.0})) == "bxy"
     assert names_of(play("xy", {"x": 50.0, "y": 7.9})) == "bx"
     assert names_of(play("x", {"x": 1.0})) == "bx"
+    little = play("x", {"x": RULES.sure - 1, "p": 900.0}, {"bx": [candidate("bxp", 900.0)]}, gain=RULES.small / 2)
+    assert names_of(little) == "bx", "beside an effect that explains little nothing is added"
 
 
 def test_an_effect_is_worth_what_it_adds_to_the_structure_that_was_asked_beside(play: Played) -> None:
@@ -168,11 +170,6 @@ def test_a_search_stops_after_so_many_structures_and_says_what_was_not_asked(pla
     assert (stopped.base.names, stopped.last.current) == ("b", stopped.chosen)
 
 
-def test_beside_an_effect_that_explains_little_nothing_is_added(play: Played) -> None:
-    worth = {"x": RULES.sure - 1, "p": 900.0}
-    assert names_of(play("x", worth, {"bx": [candidate("bxp", 900.0)]}, gain=RULES.small / 2)) == "bx"
-
-
 def accepted(
     name: str, beside: str = "", evidence: float = 100.0, removes: float = 0.5, **margins: float
 ) -> AcceptedEffect:
@@ -229,11 +226,9 @@ class Held(Tables):
         return (old - new) / old, (old - new) / old
 
     def at_rest(self, *_: Structure) -> float:
-        """None of the effects remembers."""
         return 0.0
 
     def in_motion(self, *both: Structure) -> float:
-        """As everywhere else."""
         return self.plain_gains(*both)[0]
 
 
