@@ -3,6 +3,7 @@
 import re
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,34 +28,34 @@ def test_true_numbers_become_an_effect_of_the_library() -> None:
         assert true_effect(make_case(4, [name], duration=10.0).truth["effects"][0]).id == name
 
 
+def concealing(folder: Path, *effects: str) -> list[dict[str, Any]]:
+    """Write a case of 12 s into a folder, as the tool is given it, and return what is true of its effects."""
+    case = make_case(8, effects, duration=12.0)
+    write_given(case, folder)
+    found: list[dict[str, Any]] = case.truth["effects"]
+    return found
+
+
 def test_the_true_structure_refitted_leaves_less_than_the_base(tmp_path: Path) -> None:
-    case = make_case(8, ["torque_offset"], duration=12.0)
-    write_given(case, tmp_path)
-    best = ceiling(str(tmp_path), case.truth["effects"])["heldout_rms"]
-    base = ceiling(str(tmp_path), [])["heldout_rms"]
-    narrow = ceiling(str(tmp_path), case.truth["effects"], band=(8.0, 11.0))
-    assert narrow["heldout_rms"] < 0.99 * best, "less of the reading's noise"
+    true, folder = concealing(tmp_path, "torque_offset"), str(tmp_path)
+    best, base = (ceiling(folder, entries)["heldout_rms"] for entries in (true, []))
+    assert ceiling(folder, true, band=(8.0, 11.0))["heldout_rms"] < 0.99 * best, "less of the reading's noise"
     assert best < 0.8 * base
-    assert (
-        "no structure" in ceiling(str(tmp_path), [{"effect": "rubbing", "listed": False, "parameters": {}}])["reason"]
-    )
-    assert len(given(str(tmp_path))[1]) == 2
+    assert "no structure" in ceiling(folder, [{"effect": "rubbing", "listed": False, "parameters": {}}])["reason"]
+    assert len(given(folder)[1]) == 2
 
 
 def test_of_two_effects_the_one_that_matters_is_missed_where_it_is_left_out(tmp_path: Path) -> None:
-    case = make_case(8, ["torque_offset", "stribeck"], duration=12.0)
-    write_given(case, tmp_path)
-    best = ceiling(str(tmp_path), case.truth["effects"])
+    best = ceiling(str(tmp_path), concealing(tmp_path, "torque_offset", "stribeck"))
     assert set(best["without"]) == {"torque_offset", "stribeck"}
     assert best["heldout_rms"] < 0.8 * best["without"]["torque_offset"]
 
 
 def test_a_ceiling_that_is_worse_than_the_base_it_contains_is_rejected(tmp_path: Path) -> None:
     """In training or held out: it is then no excuse for a miss, and the case is counted as one without a gap."""
-    case = make_case(8, ["torque_offset"], duration=12.0)
-    write_given(case, tmp_path)
+    (true,) = concealing(tmp_path, "torque_offset")
     card, train, held = given(str(tmp_path))
-    base, best = _refitted([card.plant()], [true_effect(case.truth["effects"][0])], prepare(train, 20.0))
+    base, best = _refitted([card.plant()], [true_effect(true)], prepare(train, 20.0))
     assert best.cost < base.cost
     judge = partial(heldout_rms, [held])
     good = judged(judge, base, best)
