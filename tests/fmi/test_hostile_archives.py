@@ -3,6 +3,7 @@
 import struct
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -93,48 +94,41 @@ def test_an_archive_of_too_much_is_refused(
         FmuComponent(tiny[3])
 
 
-def test_two_members_of_one_name_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="Duplicate name"):
-        bad = changed(tiny[3], tmp_path / "bad.fmu", ("modelDescription.xml", b"<other/>"))
-    with pytest.raises(FmuError, match=r'it holds two members "modelDescription\.xml"'):
-        FmuComponent(bad)
-
-
-def spoiled(good: Path, bad: Path, field: int, value: int, kind: bytes = b"PK\x01\x02") -> Path:
+def with_field(good: bytes, field: int, value: int) -> bytes:
     """Write another 16-bit number into the last entry of the table of contents (and of nothing else)."""
-    content = bytearray(good.read_bytes())
-    struct.pack_into("<H", content, content.rindex(kind) + field, value)
-    bad.write_bytes(bytes(content))
-    return bad
+    content = bytearray(good)
+    struct.pack_into("<H", content, content.rindex(b"PK\x01\x02") + field, value)
+    return bytes(content)
+
+
+def with_a_bit_turned(good: bytes) -> bytes:
+    content = bytearray(good)
+    content[content.index(b"\x7fELF") + 1000] ^= 1
+    return bytes(content)
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "sentence"), [(8, 1, "has a password"), (10, 99, r"is packed in a way that is not known \(99\)")]
+    ("spoil", "sentence"),
+    [
+        (lambda good: with_field(good, 8, 1), "has a password"),
+        (lambda good: with_field(good, 10, 99), r"is packed in a way that is not known \(99\)"),
+        (with_a_bit_turned, r"tiny\.so\" cannot be unpacked: Bad CRC-32 for file"),
+        *((lambda good, length=length: good[:length], r"bad\.fmu is no FMU") for length in (0, 10, 100, -1, -30)),
+    ],
 )
-def test_a_member_that_cannot_be_unpacked_is_refused(
-    tiny: dict[int, Path], tmp_path: Path, field: int, value: int, sentence: str
+def test_an_archive_that_is_damaged_or_cut_short_is_refused_and_leaves_nothing(
+    tiny: dict[int, Path], tmp_path: Path, temporary: Path, spoil: Callable[[bytes], bytes], sentence: str
 ) -> None:
+    (bad := tmp_path / "bad.fmu").write_bytes(spoil(tiny[3].read_bytes()))
     with pytest.raises(FmuError, match=sentence):
-        FmuComponent(spoiled(tiny[3], tmp_path / "bad.fmu", field, value))
-
-
-def test_a_member_that_is_damaged_is_found_when_it_is_unpacked(
-    tiny: dict[int, Path], tmp_path: Path, temporary: Path
-) -> None:
-    content = bytearray(tiny[3].read_bytes())
-    content[content.index(b"\x7fELF") + 1000] ^= 1
-    bad = tmp_path / "bad.fmu"
-    bad.write_bytes(bytes(content))
-    with pytest.raises(FmuError, match=r"tiny\.so\" cannot be unpacked: Bad CRC-32 for file"):
         FmuComponent(bad)
     assert list(temporary.iterdir()) == []
 
 
-@pytest.mark.parametrize("length", [0, 10, 100, -1, -30])
-def test_an_archive_that_is_cut_short_is_no_fmu(tiny: dict[int, Path], tmp_path: Path, length: int) -> None:
-    bad = tmp_path / "cut.fmu"
-    bad.write_bytes(tiny[3].read_bytes()[:length])
-    with pytest.raises(FmuError, match=r"cut\.fmu is no FMU"):
+def test_two_members_of_one_name_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        bad = changed(tiny[3], tmp_path / "bad.fmu", ("modelDescription.xml", b"<other/>"))
+    with pytest.raises(FmuError, match=r'it holds two members "modelDescription\.xml"'):
         FmuComponent(bad)
 
 
