@@ -97,22 +97,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("rude")
 
 
-def scenario_of(path: Path, text: str) -> Path:
-    path.write_text(text)
+def scenario_of(path: Path, text: str, fmu: Path | str = "", **more: object) -> Path:
+    """Write a scenario around an FMU."""
+    path.write_text(text.format(fmu=fmu, **({"more": ""} | more)))
     return path
 
 
 def probed(*scenarios: Path) -> list[dict[str, Any]]:
     """Run scenarios one after the other in one process without isolation."""
-    done = subprocess.run(
-        [sys.executable, PROBE, *scenarios],
-        env=ENVIRONMENT | {"KIND": "own"},
-        cwd=scenarios[0].parent,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    command, given = [sys.executable, PROBE, *scenarios], ENVIRONMENT | {"KIND": "own"}
+    done = subprocess.run(command, env=given, cwd=scenarios[0].parent, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found
@@ -124,18 +118,18 @@ STAGES_ASKED = (
 )
 
 
+def deeds(stage: str) -> list[str]:
+    return [name for name in NAMES if stage != "load" or name in ("upward", "flush")]
+
+
 @pytest.fixture(scope="module")
 def answers(folder: Path, tiny: dict[int, Path]) -> dict[str, dict[str, Any]]:
     """What is left in a process by a run of each FMU, all one after the other in the same."""
-    asked = {}
-    for version, stage in STAGES_ASKED:
-        for deed in (name for name in NAMES if stage != "load" or name in ("upward", "flush")):
-            fmu = rude_fmu(folder, version, deed, stage)
-            asked[fmu.name] = scenario_of(fmu.with_suffix(".toml"), ONE.format(fmu=fmu, more=""))
-    fmu = rude_fmu(folder, 2, "handle", "initialise")
-    asked[fmu.name] = scenario_of(fmu.with_suffix(".toml"), ONE.format(fmu=fmu, more=""))
-    two = TWO.format(fmu=rude_fmu(folder, 2, "umask", "step"), tiny=tiny[2], output="third", more="")
-    asked["two"] = scenario_of(folder / "several.toml", two)
+    rude = [rude_fmu(folder, version, deed, stage) for version, stage in STAGES_ASKED for deed in deeds(stage)]
+    rude.append(rude_fmu(folder, 2, "handle", "initialise"))
+    asked = {fmu.name: scenario_of(fmu.with_suffix(".toml"), ONE, fmu) for fmu in rude}
+    several = rude_fmu(folder, 2, "umask", "step")
+    asked["two"] = scenario_of(folder / "several.toml", TWO, several, tiny=tiny[2], output="third")
     return dict(zip(asked, probed(*asked.values()), strict=True))
 
 
@@ -143,22 +137,26 @@ def answers(folder: Path, tiny: dict[int, Path]) -> dict[str, dict[str, Any]]:
 def test_what_an_fmu_changes_in_the_process_is_put_back_and_named(
     answers: dict[str, dict[str, Any]], version: int, stage: str
 ) -> None:
-    for deed in (name for name in NAMES if stage != "load" or name in ("upward", "flush")):
+    for deed in deeds(stage):
         name = f"rude_{version}_CoSimulation_{deed}_{stage}.fmu"
         assert answers[name]["changed"] == [], name
         assert answers[name]["notes"] == [f"a ({name}) changed {NAMES[deed]}; restored."]
 
 
-def test_a_handler_that_a_runtime_may_need_stays_until_its_fmu_is_closed(answers: dict[str, dict[str, Any]]) -> None:
-    name = "rude_2_CoSimulation_handle_initialise.fmu"
-    assert answers[name]["changed"] == []
-    assert answers[name]["notes"] == [f"a ({name}) handles SIGUSR1 itself until it is closed; then restored."]
+HANDLES = "rude_2_CoSimulation_handle_initialise.fmu"
 
 
-def test_where_one_of_several_changed_something_in_the_loop_all_are_named(answers: dict[str, dict[str, Any]]) -> None:
-    assert answers["two"]["changed"] == []
-    said = "One of the components (other, rude) that were started and stepped changed the umask; restored."
-    assert answers["two"]["notes"] == [said]
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (HANDLES, f"a ({HANDLES}) handles SIGUSR1 itself until it is closed; then restored."),
+        ("two", "One of the components (other, rude) that were started and stepped changed the umask; restored."),
+    ],
+)
+def test_a_handler_stays_until_its_fmu_is_closed_and_of_several_all_are_named(
+    answers: dict[str, dict[str, Any]], name: str, said: str
+) -> None:
+    assert answers[name] == {"changed": [], "notes": [said]}
 
 
 CALLS = [
@@ -176,25 +174,17 @@ ARITHMETIC = ["upward", *(["flush"] if platform.machine() == "x86_64" else [])]
 
 
 @pytest.mark.parametrize("deed", ARITHMETIC)
-@pytest.mark.parametrize(
-    ("kind", "version", "stage", "output", "more"), CALLS, ids=["-".join(map(str, one[:4])) for one in CALLS]
-)
+@pytest.mark.parametrize("rude", CALLS, ids=["-".join(map(str, one[:4])) for one in CALLS])
 @pytest.mark.parametrize("compiled", [True, False])
 def test_arithmetic_that_an_fmu_changes_in_its_calls_changes_no_bit_of_others(
-    folder: Path,
-    tiny: dict[int, Path],
-    deed: str,
-    kind: str,
-    version: int,
-    stage: str,
-    output: str,
-    more: str,
-    compiled: bool,
+    folder: Path, tiny: dict[int, Path], deed: str, rude: tuple[Any, ...], compiled: bool
 ) -> None:
+    kind, version, stage, output, more = rude
     rows = {}
     for what in ("nothing", deed):
-        text = TWO.format(fmu=rude_fmu(folder, version, what, stage, kind), tiny=tiny[2], output=output, more=more)
-        done = cosim.run(scenario_of(folder / "two.toml", text), compiled=compiled)
+        fmu = rude_fmu(folder, version, what, stage, kind)
+        scenario = scenario_of(folder / "two.toml", TWO, fmu, tiny=tiny[2], output=output, more=more)
+        done = cosim.run(scenario, compiled=compiled)
         rows[what] = done.recording
     for name in rows["nothing"]:
         np.testing.assert_array_equal(rows[deed][name], rows["nothing"][name])
@@ -209,7 +199,7 @@ def test_an_fmu_that_does_not_come_back_when_it_is_closed_costs_a_note_and_no_ro
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], deed: str, stage: str
 ) -> None:
     fmu = rude_fmu(folder, 2, deed, stage)
-    scenario = scenario_of(tmp_path / "late.toml", ONE.format(fmu=fmu, more=""))
+    scenario = scenario_of(tmp_path / "late.toml", ONE, fmu)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 0
     recording = Recording.read(tmp_path / "out" / "recording.parquet", required=())
     assert (len(recording), recording.origin["complete"]) == (3, True)
@@ -225,7 +215,7 @@ def test_rows_before_a_failure_are_kept_though_the_fmu_does_not_come_back_when_i
 ) -> None:
     fmu = rude_fmu(folder, 2, "hang", "free")
     more = f"parameters = {{ deed = {DEEDS.index('fail')}, stage = {STAGES.index('step')} }}"
-    scenario = scenario_of(tmp_path / "late.toml", ONE.format(fmu=fmu, more=more))
+    scenario = scenario_of(tmp_path / "late.toml", ONE, fmu, more=more)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 2
     said = capsys.readouterr().err
     assert "a returned an error at tick 0 (0 s)" in said
@@ -236,7 +226,7 @@ def test_rows_before_a_failure_are_kept_though_the_fmu_does_not_come_back_when_i
 @pytest.mark.parametrize("option", ["--isolate", "--no-isolate"])
 def test_an_fmu_that_leaves_a_thread_keeps_its_library(folder: Path, tmp_path: Path, option: str) -> None:
     fmu = rude_fmu(folder, 2, "thread", "initialise")
-    scenario = scenario_of(tmp_path / "thread.toml", ONE.format(fmu=fmu, more=""))
+    scenario = scenario_of(tmp_path / "thread.toml", ONE, fmu)
     command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), option]
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
@@ -246,7 +236,7 @@ def test_an_fmu_that_leaves_a_thread_keeps_its_library(folder: Path, tmp_path: P
 
 def test_an_isolated_fmu_that_reads_its_standard_input_finds_nothing(folder: Path, tmp_path: Path) -> None:
     fmu = rude_fmu(folder, 2, "read", "step")
-    scenario = scenario_of(tmp_path / "read.toml", ONE.format(fmu=fmu, more=""))
+    scenario = scenario_of(tmp_path / "read.toml", ONE, fmu)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 5) == 0
     assert len(Recording.read(tmp_path / "out" / "recording.parquet", required=())) == 3
 
@@ -254,8 +244,7 @@ def test_an_isolated_fmu_that_reads_its_standard_input_finds_nothing(folder: Pat
 def test_a_function_that_changes_the_process_is_named_too(tmp_path: Path) -> None:
     (tmp_path / "moves.py").write_text("import os\ndef moves(t):\n    os.chdir('/')\n    return {'y': t}\n")
     text = ONE.replace('fmu = "{fmu}"', 'python = "moves.py:moves"\ninputs = {{}}\noutputs = {{ y = "s" }}')
-    scenario = scenario_of(tmp_path / "function.toml", text.replace("a.third", "a.y").format(more=""))
-    (answer,) = probed(scenario)
+    (answer,) = probed(scenario_of(tmp_path / "function.toml", text.replace("a.third", "a.y")))
     assert answer["changed"] == []
     assert "a (moves.py:moves) changed the working directory; restored." in answer["notes"]
 
@@ -266,7 +255,7 @@ def test_a_recording_lies_where_out_says_though_an_fmu_changes_the_working_direc
 ) -> None:
     for stage in ("setup", "step", "free"):
         fmu = rude_fmu(folder, 2, "directory", stage)
-        scenario_of(tmp_path / "moves.toml", ONE.format(fmu=fmu, more=""))
+        scenario_of(tmp_path / "moves.toml", ONE, fmu)
         monkeypatch.chdir(tmp_path)
         assert call("run", "moves.toml", "--out", stage, option) == 0
         made = sorted(str(one.relative_to(tmp_path)) for one in (tmp_path / stage).iterdir())
