@@ -11,6 +11,7 @@ import pytest
 from compiling import compiled, packed, with_stubs
 from oscillators import BOTH
 from simulating import alone, simulate
+from small_loop import text_of
 
 from cosim.fmi.fmu import FmuComponent
 from cosim.master.exchange import ExchangeComponent, open_fmu
@@ -149,19 +150,12 @@ def test_an_fmu_with_both_interfaces_is_stepped_by_co_simulation_unless_told(
 
 
 def test_a_scenario_chooses_the_interface(fmus: Fmus) -> None:
-    text = f"""
-    stop = 0.1
-    step = 1e-2
-    [components.axis]
-    fmu = "{fmus["lugre", 3]}"
-    interface = "model-exchange"
-    parameters = {{ drive = 20.0 }}
-    [record]
-    signals = ["axis.reading"]
-    """
-    done = run(parse_scenario(text, "x.toml", Path()))
-    plain = run(parse_scenario(text.replace('"model-exchange"', '"co-simulation"'), "x.toml", Path()))
-    np.testing.assert_allclose(done.recording["axis.reading"], plain.recording["axis.reading"], rtol=1e-6)
+    found = []
+    for interface in ("model-exchange", "co-simulation"):
+        axis = {"fmu": fmus["lugre", 3], "interface": interface, "parameters": {"drive": 20.0}}
+        text = text_of({}, stop=0.1, step=1e-2, components={"axis": axis}, record={"signals": ["axis.reading"]})
+        found.append(run(parse_scenario(text, "x.toml", Path())).recording["axis.reading"])
+    np.testing.assert_allclose(*found, rtol=1e-6)
 
 
 @VERSIONS

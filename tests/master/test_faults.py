@@ -8,6 +8,7 @@ import pytest
 from oscillators import BOTH, Tiny
 from pydantic import TypeAdapter, ValidationError
 from simulating import alone
+from small_loop import text_of
 
 from cosim.data.recording import Recording
 from cosim.master.simulate import run as run_scenario
@@ -88,32 +89,15 @@ def test_a_fault_on_nothing_or_with_its_end_before_its_begin_is_refused(tiny: Ti
         fault(on="r", kind="freeze", until=0.005)
 
 
-TEXT = """
-stop = 0.05
-step = 1e-3
-[components.one]
-fmu = "tiny3.fmu"
-[signals.r]
-kind = "ramp"
-velocity = 1.0
-[[connections]]
-from = "r.position"
-to = "one.a"
-[[faults]]
-on = "one.a"
-kind = "override"
-value = 7.0
-from = 0.02
-[record]
-signals = ["one.a"]
-"""
-
-
 def test_faults_are_read_from_a_scenario_and_kept_in_the_recording(tiny: Tiny) -> None:
-    done = run_scenario(parse_scenario(TEXT, "x.toml", tiny[3].parent)).recording
+    tables: dict[str, Any] = {"stop": 0.05, "step": 1e-3, "record": {"signals": ["one.a"]}}
+    tables |= {"components": {"one": {"fmu": tiny[3]}}, "signals": {"r": {"kind": "ramp", "velocity": 1.0}}}
+    hangs: dict[str, Any] = {"on": "one.a", "kind": "override", "value": 7.0, "from": 0.02}
+    text = text_of({"one.a": "r.position"}, faults=[hangs], **tables)
+    done = run_scenario(parse_scenario(text, "x.toml", Path())).recording
     np.testing.assert_allclose(done["one.a"], np.where(RAMP < 20, RAMP * 1e-3, 7.0), atol=1e-15)
     assert done.origin["faults"] == [{"on": "one.a", "start": 0.02, "until": None, "kind": "override", "value": 7.0}]
     with pytest.raises(
         ScenarioError, match=r'"faults.0.override.factor" is no key of a scenario; keys there are: on, from'
     ):
-        parse_scenario(TEXT.replace("value = 7.0", "factor = 7.0\nvalue = 1.0"), "x.toml", Path())
+        parse_scenario(text_of({}, faults=[hangs | {"factor": 7.0}], **tables), "x.toml", Path())

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator
 from simulating import alone
+from small_loop import text_of
 
 import cosim.master.execution
 from cosim.data.recording import Recording
@@ -220,16 +221,9 @@ def test_the_last_row_is_the_sample_at_stop_where_one_falls_due(tiny: Tiny, tick
 @BOTH
 @VERSIONS
 def test_components_and_recording_begin_at_the_start(tiny: Tiny, version: int, compiled: bool) -> None:
-    text = f"""
-    start = 5.0
-    stop = 7.0
-    step = 0.5
-    [components.one]
-    fmu = "{tiny[version]}"
-    parameters = {{ a = 1.0, status = {ENDS}, fail_at = 6.0 }}
-    [record]
-    signals = ["one.y"]
-    """
+    one = {"fmu": tiny[version], "parameters": {"a": 1.0, "status": ENDS, "fail_at": 6.0}}
+    times = {"start": 5.0, "stop": 7.0, "step": 0.5}
+    text = text_of({}, **times, components={"one": one}, record={"signals": ["one.y"]})
     done = run(parse_scenario(text, "x.toml", Path()), Options(compiled=compiled))
     np.testing.assert_array_equal(done.recording.t, [5.0, 5.5, 6.0])
     assert done.statistics["ended"] == "one asked to end the simulation at tick 2 (6 s)"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mirror_fmu import EDGES, LOOPS, description, named
 from simulating import alone, pair
+from small_loop import text_of
 from tiny_fmu import described
 
 from cosim.fmi.component import Port
@@ -15,7 +16,7 @@ from cosim.master.simulate import Options, run
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.algorithm import GaussSeidel
 from cosim.system.conversions import check_wire
-from cosim.system.scenario import parse_scenario
+from cosim.system.scenario import Scenario, parse_scenario
 from cosim.system.wire import Record, Wire
 
 WIDER = [
@@ -183,35 +184,20 @@ def test_an_integer_beyond_2_53_is_exact_or_an_error_but_never_rounded(mirror: d
         through("int64", Record("two.int64_out", "mean"), 2**53 + 1)
 
 
-MAPS = """
-step = 0.1
-stop = 0.4
-[components.one]
-fmu = "{fmu}"
-parameters = {{ enumeration_in = "angry", int8_in = 3, boolean_in = true }}
-[components.two]
-fmu = "{fmu}"
-[[connections]]
-from = "one.enumeration_out"
-to = "two.enumeration_in"
-map = {{ {moods} }}
-[[connections]]
-from = "one.int8_out"
-to = "two.int8_in"
-map = {{ 3 = 5, 5 = 7 }}
-[[connections]]
-from = "one.boolean_out"
-to = "two.boolean_in"
-map = {{ true = false, false = true }}
-[record]
-signals = {{ mood = "two.enumeration_in", n = "two.int8_in", not = "two.boolean_in" }}
-"""
+def with_maps(fmu: Path, moods: dict[str, Any]) -> Scenario:
+    parameters = {"enumeration_in": "angry", "int8_in": 3, "boolean_in": True}
+    maps = {"enumeration": moods, "int8": {"3": 5, "5": 7}, "boolean": {"true": False, "false": True}}
+    wires = {f"two.{kind}_in": {"from": f"one.{kind}_out", "map": one} for kind, one in maps.items()}
+    signals = {"mood": "two.enumeration_in", "n": "two.int8_in", "not": "two.boolean_in"}
+    both = {"one": {"fmu": fmu, "parameters": parameters}, "two": {"fmu": fmu}}
+    text = text_of(wires, step=0.1, stop=0.4, components=both, record={"signals": signals})
+    return parse_scenario(text, "x.toml", Path())
 
 
 @LOOPS
 def test_a_map_puts_values_and_items_in_the_place_of_others(compiled: bool, mirror: dict[int, Path]) -> None:
-    text = MAPS.format(fmu=mirror[3], moods='angry = "calm", calm = "angry"')
-    recording = run(parse_scenario(text, "x.toml", Path()), Options(compiled=compiled)).recording
+    moods = {"angry": "calm", "calm": "angry"}
+    recording = run(with_maps(mirror[3], moods), Options(compiled=compiled)).recording
     assert (recording["mood"][0], recording["mood"][-1]) == (30.0, 10.0)
     assert recording["n"][-1] == 5.0
     assert (recording["not"][0], recording["not"][-1]) == (1.0, 0.0)
@@ -220,13 +206,13 @@ def test_a_map_puts_values_and_items_in_the_place_of_others(compiled: bool, mirr
 @pytest.mark.parametrize(
     ("moods", "said"),
     [
-        ('angry = "sad"', 'names "sad", which "two.enumeration_in" does not have; there are: calm, angry'),
-        ("30 = 20", r"leaves 30 \(angry\), which the target does not know"),
+        ({"angry": "sad"}, 'names "sad", which "two.enumeration_in" does not have; there are: calm, angry'),
+        ({"30": 20}, r"leaves 30 \(angry\), which the target does not know"),
     ],
 )
-def test_a_map_to_what_is_not_there_is_refused(moods: str, said: str, mirror: dict[int, Path]) -> None:
+def test_a_map_to_what_is_not_there_is_refused(moods: dict[str, Any], said: str, mirror: dict[int, Path]) -> None:
     with pytest.raises(WiringError, match=said):
-        run(parse_scenario(MAPS.format(fmu=mirror[3], moods=moods), "x.toml", Path()))
+        run(with_maps(mirror[3], moods))
 
 
 # Arrays of FMI 3: wired whole and by index, sized by structural parameters, given start values.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_fmu import foreign
-from small_loop import TEXT
+from small_loop import TEXT, text_of
 from tiny_fmu import described, description
 
 from cosim.fmi.description import describe
@@ -112,21 +112,11 @@ def test_a_mistake_in_the_mapping_names_key_and_choices(tiny: dict[int, Path], t
 
 
 def test_an_array_has_our_name_whole_and_by_element(mirror: dict[int, Path]) -> None:
-    text = f"""
-    step = 0.1
-    stop = 0.4
-    [components.one]
-    fmu = "{mirror[3]}"
-    variables = {{ force = "u", reply = "y", size = "n" }}
-    parameters = {{ size = 2, force = [3, 4] }}
-    [components.two]
-    fmu = "{mirror[3]}"
-    variables = {{ force = {{ name = "u", unit = "N" }} }}
-    [[connections]]
-    from = "one.reply[2]"
-    to = "two.force[1]"
-    [record]
-    signals = {{ reply = "one.reply", y = "two.y[1]" }}
-    """
+    ours = {"force": "u", "reply": "y", "size": "n"}
+    one = {"fmu": mirror[3], "variables": ours, "parameters": {"size": 2, "force": [3, 4]}}
+    two = {"fmu": mirror[3], "variables": {"force": {"name": "u", "unit": "N"}}}
+    signals = {"reply": "one.reply", "y": "two.y[1]"}
+    given = {"step": 0.1, "stop": 0.4, "components": {"one": one, "two": two}, "record": {"signals": signals}}
+    text = text_of({"two.force[1]": "one.reply[2]"}, **given)
     recording = run(parse_scenario(text, "x.toml", Path())).recording
     assert [recording[name][-1] for name in ("reply[1]", "reply[2]", "y")] == [3, 4, 4]

@@ -2,37 +2,24 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from commands import call
+from small_loop import text_of
 from tiny_fmu import described, description
 
 from cosim.api.show import show
 from cosim.support.errors import InputError
 
-SCENARIO = """name = "loop"
-step = 0.1
-stop = 2.0
-{algorithm}
-[components.mass]
-fmu = "{fmu}"
-[components.spring]
-fmu = "{fmu}"
-{every}
-[[connections]]
-from = "spring.y"
-to = "mass.b"
-[[connections]]
-from = "mass.y"
-to = "spring.a"
-[record]
-signals = ["mass.y"]
-"""
 
-
-def scenario(folder: Path, fmu: Path, algorithm: str = "", every: str = "") -> str:
+def scenario(folder: Path, fmu: Path, every: int = 1, **algorithm: Any) -> str:
+    both = {"mass": {"fmu": fmu}, "spring": {"fmu": fmu, "every": every}}
+    given = {"name": "loop", "step": 0.1, "stop": 2.0, "components": both, "record": {"signals": ["mass.y"]}}
     path = folder / "loop.toml"
-    path.write_text(SCENARIO.format(fmu=fmu, algorithm=algorithm, every=every))
+    path.write_text(
+        text_of({"mass.b": "spring.y", "spring.a": "mass.y"}, **given, algorithm={"kind": "jacobi"} | algorithm)
+    )
     return str(path)
 
 
@@ -45,7 +32,7 @@ def test_jacobi_gathers_all_before_any_steps_and_values_are_a_step_old(tiny: dic
 
 
 def test_gauss_seidel_hands_on_what_is_new(tiny: dict[int, Path], tmp_path: Path) -> None:
-    file = scenario(tmp_path, tiny[3], '[algorithm]\nkind = "gauss-seidel"\norder = ["spring", "mass"]')
+    file = scenario(tmp_path, tiny[3], kind="gauss-seidel", order=["spring", "mass"])
     tables = show(file, schedule=True).tables
     assert [row["component"] for row in tables["order"]] == ["spring", "spring", "mass", "mass"]
     ages = {row["input"]: row["age"] for row in tables["inputs"]}
@@ -53,22 +40,25 @@ def test_gauss_seidel_hands_on_what_is_new(tiny: dict[int, Path], tmp_path: Path
 
 
 def test_a_slower_component_says_when_it_looks_and_when_it_shows(tiny: dict[int, Path], tmp_path: Path) -> None:
-    tables = show(scenario(tmp_path, tiny[3], every="every = 4"), schedule=True).tables
+    tables = show(scenario(tmp_path, tiny[3], every=4), schedule=True).tables
     when = [row["when"] for row in tables["order"] if row["component"] == "spring"]
     assert when == ["in the first of 4 steps (0.4 s)", "in the last of 4 steps (0.4 s)"]
+
+
+PIECES = "extrapolated to the middle of each of up to 64 pieces"
 
 
 @pytest.mark.parametrize(
     ("algorithm", "told"),
     [
-        ('kind = "iterated"', "held at 0.5 of its start + 0.5 of its end"),
-        ('kind = "energy"\nbonds = [["mass.y", "spring.y"]]', "extrapolated to the middle of each of up to 64 pieces"),
+        ({"kind": "iterated"}, "held at 0.5 of its start + 0.5 of its end"),
+        ({"kind": "energy", "bonds": [["mass.y", "spring.y"]]}, PIECES),
     ],
 )
 def test_coupled_inputs_say_what_they_are_over_the_step(
-    algorithm: str, told: str, tiny: dict[int, Path], tmp_path: Path
+    algorithm: dict[str, Any], told: str, tiny: dict[int, Path], tmp_path: Path
 ) -> None:
-    tables = show(scenario(tmp_path, tiny[3], f"[algorithm]\n{algorithm}"), schedule=True).tables
+    tables = show(scenario(tmp_path, tiny[3], **algorithm), schedule=True).tables
     assert {row["over the step"] for row in tables["inputs"]} == {told}
 
 

@@ -1,4 +1,7 @@
-"""A loop of two small FMUs, as the text of a scenario."""
+"""Texts of scenarios: any from its tables, and a loop of two small FMUs."""
+
+import json
+from typing import Any
 
 TEXT = """
 name = "loop"
@@ -34,3 +37,18 @@ to = "controller.a"
 signals = { q = "plant.y", tau = { signal = "plant.a", mode = "mean" }, q_d = "r.position" }
 decimation = 2
 """
+
+
+def toml(value: Any) -> str:
+    """Write a value in one line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(key)} = {toml(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value if isinstance(value, int | float | str) else str(value), ensure_ascii=False)
+
+
+def text_of(wires: dict[str, Any], **tables: Any) -> str:
+    """The text of a scenario: by their targets, what wires come from or say; and its other tables."""
+    connections = [{"to": end} | (one if isinstance(one, dict) else {"from": one}) for end, one in wires.items()]
+    return "\n".join(f"{key} = {toml(value)}" for key, value in (tables | {"connections": connections}).items())
