@@ -128,8 +128,9 @@ main()
     assert not [one for one in tmp_path.rglob("*") if one.is_file()]
 
 
-FINALIZED = """
+PROGRAM = """
 import signal, time
+import casadi as ca
 from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
 
@@ -137,22 +138,8 @@ class Last:
     def __del__(self):
         {comes}
 
-def verb():
-    Last()
-    time.sleep({seconds})
-
-end_well()
-guarded(verb, False)()
-"""
-ASKED = """
-import signal, time
-import casadi as ca
-from cosim.cli import guarded, main
-from cosim.support.interrupts import end_well
-
 class Shaped:
     asked = 0
-
     @property
     def shape(self):
         self.asked += 1
@@ -162,7 +149,7 @@ class Shaped:
 
 def verb():
     try:
-        ca.fmax(ca.SX.sym("x"), Shaped())
+        {what}
     except NotImplementedError:
         pass  # it is no number
     time.sleep({seconds})
@@ -170,24 +157,23 @@ def verb():
 end_well()
 guarded(verb, False)()
 """
+FINALIZED, ASKED = "Last()", 'ca.fmax(ca.SX.sym("x"), Shaped())'
 
 
-def ended(program: str, comes: str, seconds: float) -> tuple[int, str]:
+def ended(what: str, comes: str, seconds: float) -> tuple[int, str]:
     """Run a verb in which something comes while an object is finalized, or while CasADi asks one for its shape."""
-    command = [sys.executable, "-c", program.format(comes=comes, seconds=seconds)]
+    command = [sys.executable, "-c", PROGRAM.format(what=what, comes=comes, seconds=seconds)]
     done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("program", [FINALIZED, ASKED], ids=["finalized", "casadi"])
+@pytest.mark.parametrize("what", [FINALIZED, ASKED], ids=["finalized", "casadi"])
 @pytest.mark.parametrize(
     ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_a_signal_that_comes_where_errors_are_ignored_is_not_lost(
-    program: str, name: str, code: int, said: str
-) -> None:
-    assert ended(program, f"signal.raise_signal(signal.{name})", 600) == (code, said)
+def test_a_signal_that_comes_where_errors_are_ignored_is_not_lost(what: str, name: str, code: int, said: str) -> None:
+    assert ended(what, f"signal.raise_signal(signal.{name})", 600) == (code, said)
 
 
 def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:

@@ -1,6 +1,5 @@
 """Numbers that arithmetic, counting or memory cannot take are one sentence before anything runs."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,22 +11,34 @@ from small_loop import TEXT
 
 import cosim
 from cosim.data.signals import Samples, Slews, Stream
-from cosim.hardware.machine import parse_machine
+from cosim.hardware.machine import read_machine
 from cosim.master.simulate import run
-from cosim.support.errors import HardwareError, InputError, OutputError, ScenarioError, SignalError, SweepError
+from cosim.support.errors import CosimError, InputError, OutputError, ScenarioError, SignalError, SweepError
 from cosim.support.files import check_free
 from cosim.support.numbers import shown
 from cosim.sweeps.file import read_sweep
-from cosim.system.scenario import parse_scenario
-from pyfmi_models.card import parse_card
+from cosim.system.scenario import parse_scenario, read_scenario
+from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.errors import CardError
 
-DIGITS, NESTED = "1" + "0" * 5000, "[" * 2000 + "]" * 2000
 SINE = 'kind = "sine"\nfrequency = 2.0\namplitude = 0.1'
 SLEWS = 'kind = "slews"\nmax_velocity = 1.0\nmax_acceleration = 1.0'
 ITERATED = '[algorithm]\nkind = "iterated"'
 FAULT = '[[faults]]\non = "plant.a"\nkind = "offset"\nvalue = 1.0\n'
 CARD = (Path(__file__).parents[2] / "pyfmi_models" / "cards" / "paper_mount.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("number", "rule"),
+    [("1" + "0" * 5000, "a number in it has too many digits"), ("[" * 2000 + "]" * 2000, "its brackets are nested")],
+    ids=["digits", "brackets"],
+)
+@pytest.mark.parametrize("kind", ["scenario", "card", "sweep", "machine"])
+def test_no_file_has_a_number_that_reading_it_cannot_take(kind: str, number: str, rule: str, tmp_path: Path) -> None:
+    (path := tmp_path / "file.toml").write_text(f"a = {number}")
+    readers = {"scenario": read_scenario, "card": read_card, "sweep": read_sweep, "machine": read_machine}
+    with pytest.raises((CardError, CosimError), match=f"is not valid TOML: {rule}"):
+        readers[kind](path)
 
 
 @pytest.mark.parametrize(
@@ -41,8 +52,6 @@ CARD = (Path(__file__).parents[2] / "pyfmi_models" / "cards" / "paper_mount.toml
         ("stop = 0.5", "stop = 1e308", r"stop = 1e\+308 breaks a rule: input should be less than or equal"),
         ("step = 1e-3\nstop = 0.5", "step = 1e-9\nstop = 1e8", r"stop = 1e\+08 s is 1e\+17 steps of 1e-09 s; 9,007,1"),
         ("smooth_start = 0.1", "smooth_start = 1e308", r"smooth_start = 1e\+308 breaks a rule: input should be less"),
-        ("decimation = 2", f"decimation = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
-        ("decimation = 2", f"decimation = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
         ("[record]", f"{FAULT}from = 1e308\n[record]", r"from = 1e\+308 breaks a rule: input should be less"),
         ("[record]", f"{FAULT}from = 0.1\nuntil = 1e308\n[record]", r"until = 1e\+308 breaks a rule: input should be"),
         (SINE, f"{SLEWS}\npositions = [0.0, 1e300]\nmax_jerk = 1.0", r"a move would take more than 1e\+12 s"),
@@ -137,8 +146,6 @@ def test_slews_without_limits_worth_the_name_are_steps(limit: float) -> None:
     ("old", "new", "sentence"),
     [
         ("inertia = 30.0", f"inertia = {10**400}", r"inertia = 10+\.\.\. \(401 characters\) breaks the rule"),
-        ("inertia = 30.0", f"inertia = {DIGITS}", r"not valid TOML: a number in it has too many digits"),
-        ("inertia = 30.0", f"inertia = {NESTED}", r"not valid TOML: its brackets are nested too deeply"),
         ("[mount]", f'[mount]\nname = "{"x" * 5000}"', r"name = 'x+\.\.\. \(5,002 characters\) breaks the rule"),
     ],
 )
@@ -155,8 +162,6 @@ def test_a_card_with_such_a_number_is_refused(old: str, new: str, sentence: str)
     [
         ("timeout = 2e101", r"timeout = 2e\+101 breaks a rule"),
         (f"decimation = {2**64}", r"decimation = 18446744073709551616 breaks a rule"),
-        (f"seed = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
-        (f"seed = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
         ('"a.b" = { low = 0.0, high = 1.0, count = 1000000000000 }', r"count = 1000000000000 breaks a rule"),
         ('"a.b" = { low = 0.0, high = 1e300, scale = "integer" }', r"asks for 1,000,001 runs; 1,000,000 is the most"),
         ('"a.b" = { low = -1e308, high = 1e308, count = 3 }', r"low = -1e\+308 and high = 1e\+308 are too far apart"),
@@ -168,14 +173,6 @@ def test_a_sweep_with_such_a_number_is_refused(tmp_path: Path, line: str, senten
     (path := tmp_path / "sweep.toml").write_text(f'scenario = "sidereal"\n{head}[vary]\n{varied}\n{rest}')
     with pytest.raises(SweepError, match=sentence):
         read_sweep(path)
-
-
-def test_a_machine_with_a_number_of_too_many_digits_is_refused() -> None:
-    """All others at their limits: tests of machine files."""
-    text = (files("cosim.hardware") / "machines" / "simulated.toml").read_text("utf-8")
-    assert "watchdog_ms = 2.0" in text
-    with pytest.raises(HardwareError, match=r"is not valid TOML: a number in it has too many digits"):
-        parse_machine(text.replace("watchdog_ms = 2.0", f"watchdog_ms = {DIGITS}", 1), "m.toml")
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
