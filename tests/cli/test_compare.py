@@ -13,6 +13,8 @@ from commands import call
 import cosim
 from cosim.support.errors import InputError, OutputError, RecordingError
 
+__all__ = ["browser"]
+
 
 def waves(t: np.ndarray) -> np.ndarray:
     return np.sin(1.3 * t) + 0.4 * np.sin(3.1 * t + 1)
@@ -85,11 +87,6 @@ def test_what_cannot_be_compared_is_one_sentence() -> None:
         cosim.compare(table(100.0))
     with pytest.raises(RecordingError, match="no column in common"):
         cosim.compare(table(100.0), pd.DataFrame({"t": np.arange(200) / 10, "x": np.arange(200.0)}))
-
-
-# The page of a comparison: by axe, on a phone, in the dark.
-
-__all__ = ["browser"]
 
 
 def test_axe_finds_nothing_in_the_page_of_a_comparison(browser: Any, tmp_path: Path) -> None:

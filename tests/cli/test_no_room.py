@@ -61,8 +61,8 @@ def test_a_run_without_room_for_its_recording_leaves_nothing(
 def test_a_run_without_room_for_temporary_files_says_so(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
-    (tmp_path / "tmp").mkdir()
+    (temporary := tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     with room(10_000):
         assert call("run", scenario, "--out", tmp_path / "out") == 2
     assert "file too large" in sentence(capsys).lower()

@@ -114,20 +114,18 @@ def test_the_sentence_says_who_what_when_and_how(
 
 
 def test_a_time_is_said_only_of_a_step_and_a_process_may_end_outside_of_all_calls(board: Board, scenario: Path) -> None:
-    given = read_scenario(scenario)
-    error = Watch(board, 0.001, 2.0).error(LostError("crashed", "reason", 1), given)
-    assert str(error).startswith("The process of the run ended its process with exit code 1; a component must return")
+    watch, lost, given = Watch(board, 0.001, 2.0), LostError("crashed", "reason", 1), read_scenario(scenario)
+    rule = "ended its process with exit code 1{}; a component must return"
+    assert str(watch.error(lost, given)).startswith(f"The process of the run {rule.format('')}")
     board.write("odd", "loaded")
-    error = Watch(board, 0.001, 2.0).error(LostError("crashed", "reason", 1), given)
-    assert str(error).startswith("odd ended its process with exit code 1 while it was loaded; a component must return")
+    assert str(watch.error(lost, given)).startswith(f"odd {rule.format(' while it was loaded')}")
 
 
 def test_what_a_component_writes_is_shown_and_progress_is_told(
     scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "odd.py").write_text(
-        "import sys\nsys.stderr.write('heard from odd\\n')\n\ndef odd(t, q):\n    return q\n"
-    )
+    speaks = "import sys\nsys.stderr.write('heard from odd\\n')\n\ndef odd(t, q):\n    return q\n"
+    (tmp_path / "odd.py").write_text(speaks)
     scenario.write_text(scenario.read_text() + FUNCTION)
     told: list[tuple[int, int]] = []
     given: Scenario = read_scenario(scenario)

@@ -129,6 +129,13 @@ def test_a_cast_takes_the_nearest_value_and_never_one_out_of_range(compiled: boo
         fed_by_a_signal(mirror, "Float32", [1e300], compiled, cast=True)
 
 
+def test_a_cast_between_components_is_of_numbers_only(mirror: dict[int, Path]) -> None:
+    cast, parameters = Wire("one.int16_out", "two.int8_in", cast=True), {"one": {"int16_in": -100}}
+    assert pair(mirror[3], [cast], {"y": "two.int8_out"}, parameters=parameters)["y"][-1] == -100
+    with pytest.raises(WiringError, match="a Binary cannot hold a String"):
+        pair(mirror[3], [Wire("one.string_out", "two.binary_in", cast=True)], {"y": "two.int8_out"})
+
+
 AS_DOUBLE = {
     "Int64": (-(2.0**63), 2.0**63 - 1024, -(2.0**63) - 2048, 2.0**63),
     "UInt64": (0.0, 2.0**64 - 2048, -1.0, 2.0**64),
