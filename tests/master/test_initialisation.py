@@ -34,23 +34,20 @@ def at_start(components: dict[str, Any], wires: list[Any], *names: str, **more: 
 
 @BOTH
 @VERSIONS
-@pytest.mark.parametrize("follows", ["u", None])
-def test_a_lag_starts_at_what_it_is_fed(make: Make, version: int, follows: str | None, compiled: bool) -> None:
-    components = {"lag": make("lag", version, follows=follows), "source": make("source", version, follows="")}
+@pytest.mark.parametrize(
+    ("follows", "interface"), [("u", "CoSimulation"), (None, "CoSimulation"), ("u", "ModelExchange")]
+)
+def test_a_lag_starts_at_what_it_is_fed(
+    make: Make, version: int, follows: str | None, interface: str, compiled: bool
+) -> None:
+    lag = Fmu(make("lag", version, follows=follows, interface=interface))
+    components = {"lag": lag, "source": make("source", version, follows="")}
     wires = [Wire("source.y", "lag.u", gain=2.0, offset=1.0)]
     parameters = {"source": {"c": 5.0}}
     run = started(components, wires, {"x": "lag.x", "u": "lag.u"}, parameters=parameters, compiled=compiled)
-    np.testing.assert_array_equal(run.recording["x"], [11.0] * 5)
+    np.testing.assert_allclose(run.recording["x"], [11.0] * 5, rtol=1e-9)
     np.testing.assert_array_equal(run.recording["u"], [11.0] * 5)
     assert run.statistics["notes"] == ([] if compiled else [PYTHON])
-
-
-@BOTH
-@VERSIONS
-def test_a_lag_for_model_exchange_starts_at_what_it_is_fed(make: Make, version: int, compiled: bool) -> None:
-    fmus = {"lag": Fmu(make("lag", version, follows="u", interface="ModelExchange"))}
-    run = started(fmus, [("r", "lag.u")], {"x": "lag.x"}, signals={"r": 5.0}, compiled=compiled)
-    np.testing.assert_allclose(run.recording["x"], [5.0] * 5, rtol=1e-9)
 
 
 @BOTH
