@@ -15,6 +15,7 @@ import pytest
 from commands import ENVIRONMENT, call
 from pyarrow.parquet import read_table
 from rude_fmu import DEEDS, STAGES, rude_fmu
+from small_loop import text_of
 
 import cosim
 from cosim.data.recording import Recording
@@ -45,62 +46,32 @@ if platform.machine() == "x86_64":
     NAMES |= ON_X86
 if len(os.sched_getaffinity(0)) > 1:
     NAMES["cores"] = "the cores of the thread"
-ONE = """
-name = "one"
-step = 1e-3
-stop = 0.003
-[components.a]
-fmu = "{fmu}"
-{more}
-[record]
-signals = {{ y = "a.third" }}
-"""
-TWO = """
-name = "two"
-step = 1e-3
-stop = 0.2
-[components.other]
-fmu = "{tiny}"
-parameters = {{ k = 0.1 }}
-[components.rude]
-fmu = "{fmu}"
-{more}
-[[connections]]
-from = "rude.{output}"
-to = "other.a"
-gain = 0.7
-[record]
-signals = {{ y = "other.y", wire = "other.a" }}
-"""
-TYPED = """
-[[connections]]
-from = "rude.shown"
-to = "rude.flag"
-"""
-FED = """
-[[connections]]
-from = "other.y"
-to = "rude.a"
-"""
-RING = (
-    FED
-    + """
-[algorithm]
-kind = "iterated"
-components = ["other", "rude"]
-"""
-)
+FED = {"wires": {"rude.a": "other.y"}}
+RING = FED | {"algorithm": {"kind": "iterated", "components": ["other", "rude"]}}
+
+
+def one(path: Path, fmu: Path | None = None, **component: Any) -> Path:
+    """Write a scenario of a component alone: an FMU, or what is said of it."""
+    told = {"fmu": fmu} | component if fmu else component
+    record = {"signals": {"y": "a.third" if fmu else "a.y"}}
+    path.write_text(text_of({}, name="one", step=1e-3, stop=0.003, components={"a": told}, record=record))
+    return path
+
+
+def two(
+    path: Path, fmu: Path, tiny: Path, output: str = "third", wires: Any = (), algorithm: Any = "jacobi", **rude: Any
+) -> Path:
+    """Write a scenario in which an FMU feeds another one."""
+    both = {"other": {"fmu": tiny, "parameters": {"k": 0.1}}, "rude": {"fmu": fmu} | rude}
+    wires = {"other.a": {"from": f"rude.{output}", "gain": 0.7}} | dict(wires)
+    tables = {"components": both, "record": {"signals": {"y": "other.y", "wire": "other.a"}}, "algorithm": algorithm}
+    path.write_text(text_of(wires, name="two", step=1e-3, stop=0.2, **tables))
+    return path
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("rude")
-
-
-def scenario_of(path: Path, text: str, fmu: Path | str = "", **more: object) -> Path:
-    """Write a scenario around an FMU."""
-    path.write_text(text.format(fmu=fmu, **({"more": ""} | more)))
-    return path
 
 
 def probed(*scenarios: Path) -> list[dict[str, Any]]:
@@ -127,9 +98,9 @@ def answers(folder: Path, tiny: dict[int, Path]) -> dict[str, dict[str, Any]]:
     """What is left in a process by a run of each FMU, all one after the other in the same."""
     rude = [rude_fmu(folder, version, deed, stage) for version, stage in STAGES_ASKED for deed in deeds(stage)]
     rude.append(rude_fmu(folder, 2, "handle", "initialise"))
-    asked = {fmu.name: scenario_of(fmu.with_suffix(".toml"), ONE, fmu) for fmu in rude}
+    asked = {fmu.name: one(fmu.with_suffix(".toml"), fmu) for fmu in rude}
     several = rude_fmu(folder, 2, "umask", "step")
-    asked["two"] = scenario_of(folder / "several.toml", TWO, several, tiny=tiny[2], output="third")
+    asked["two"] = two(folder / "several.toml", several, tiny[2])
     return dict(zip(asked, probed(*asked.values()), strict=True))
 
 
@@ -160,15 +131,15 @@ def test_a_handler_stays_until_its_fmu_is_closed_and_of_several_all_are_named(
 
 
 CALLS = [
-    ("CoSimulation", 2, "step", "third", ""),
+    ("CoSimulation", 2, "step", "third", {}),
     ("CoSimulation", 2, "set", "third", FED),
-    ("CoSimulation", 2, "set", "third", "step = 4e-3\n" + FED),
-    ("CoSimulation", 2, "get", "third", ""),
-    ("CoSimulation", 3, "step", "third", ""),
-    ("CoSimulation", 3, "get", "third", ""),
-    ("CoSimulation", 2, "get", "shown", TYPED),
+    ("CoSimulation", 2, "set", "third", FED | {"step": 4e-3}),
+    ("CoSimulation", 2, "get", "third", {}),
+    ("CoSimulation", 3, "step", "third", {}),
+    ("CoSimulation", 3, "get", "third", {}),
+    ("CoSimulation", 2, "get", "shown", {"wires": {"rude.flag": "rude.shown"}}),
     ("CoSimulation", 2, "save", "third", RING),
-    ("ModelExchange", 2, "rates", "x", ""),
+    ("ModelExchange", 2, "rates", "x", {}),
 ]
 ARITHMETIC = ["upward", *(["flush"] if platform.machine() == "x86_64" else [])]
 
@@ -183,8 +154,7 @@ def test_arithmetic_that_an_fmu_changes_in_its_calls_changes_no_bit_of_others(
     rows = {}
     for what in ("nothing", deed):
         fmu = rude_fmu(folder, version, what, stage, kind)
-        scenario = scenario_of(folder / "two.toml", TWO, fmu, tiny=tiny[2], output=output, more=more)
-        done = cosim.run(scenario, compiled=compiled)
+        done = cosim.run(two(folder / "two.toml", fmu, tiny[2], output, **more), compiled=compiled)
         rows[what] = done.recording
     for name in rows["nothing"]:
         np.testing.assert_array_equal(rows[deed][name], rows["nothing"][name])
@@ -199,7 +169,7 @@ def test_an_fmu_that_does_not_come_back_when_it_is_closed_costs_a_note_and_no_ro
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], deed: str, stage: str
 ) -> None:
     fmu = rude_fmu(folder, 2, deed, stage)
-    scenario = scenario_of(tmp_path / "late.toml", ONE, fmu)
+    scenario = one(tmp_path / "late.toml", fmu)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 0
     recording = Recording.read(tmp_path / "out" / "recording.parquet", required=())
     assert (len(recording), recording.origin["complete"]) == (3, True)
@@ -214,8 +184,8 @@ def test_rows_before_a_failure_are_kept_though_the_fmu_does_not_come_back_when_i
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fmu = rude_fmu(folder, 2, "hang", "free")
-    more = f"parameters = {{ deed = {DEEDS.index('fail')}, stage = {STAGES.index('step')} }}"
-    scenario = scenario_of(tmp_path / "late.toml", ONE, fmu, more=more)
+    fails = {"deed": DEEDS.index("fail"), "stage": STAGES.index("step")}
+    scenario = one(tmp_path / "late.toml", fmu, parameters=fails)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 2
     said = capsys.readouterr().err
     assert "a returned an error at tick 0 (0 s)" in said
@@ -226,7 +196,7 @@ def test_rows_before_a_failure_are_kept_though_the_fmu_does_not_come_back_when_i
 @pytest.mark.parametrize("option", ["--isolate", "--no-isolate"])
 def test_an_fmu_that_leaves_a_thread_keeps_its_library(folder: Path, tmp_path: Path, option: str) -> None:
     fmu = rude_fmu(folder, 2, "thread", "initialise")
-    scenario = scenario_of(tmp_path / "thread.toml", ONE, fmu)
+    scenario = one(tmp_path / "thread.toml", fmu)
     command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), option]
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
@@ -236,15 +206,15 @@ def test_an_fmu_that_leaves_a_thread_keeps_its_library(folder: Path, tmp_path: P
 
 def test_an_isolated_fmu_that_reads_its_standard_input_finds_nothing(folder: Path, tmp_path: Path) -> None:
     fmu = rude_fmu(folder, 2, "read", "step")
-    scenario = scenario_of(tmp_path / "read.toml", ONE, fmu)
+    scenario = one(tmp_path / "read.toml", fmu)
     assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 5) == 0
     assert len(Recording.read(tmp_path / "out" / "recording.parquet", required=())) == 3
 
 
 def test_a_function_that_changes_the_process_is_named_too(tmp_path: Path) -> None:
     (tmp_path / "moves.py").write_text("import os\ndef moves(t):\n    os.chdir('/')\n    return {'y': t}\n")
-    text = ONE.replace('fmu = "{fmu}"', 'python = "moves.py:moves"\ninputs = {{}}\noutputs = {{ y = "s" }}')
-    (answer,) = probed(scenario_of(tmp_path / "function.toml", text.replace("a.third", "a.y")))
+    moves = {"python": "moves.py:moves", "inputs": {}, "outputs": {"y": "s"}}
+    (answer,) = probed(one(tmp_path / "function.toml", **moves))
     assert answer["changed"] == []
     assert "a (moves.py:moves) changed the working directory; restored." in answer["notes"]
 
@@ -255,7 +225,7 @@ def test_a_recording_lies_where_out_says_though_an_fmu_changes_the_working_direc
 ) -> None:
     for stage in ("setup", "step", "free"):
         fmu = rude_fmu(folder, 2, "directory", stage)
-        scenario_of(tmp_path / "moves.toml", ONE, fmu)
+        one(tmp_path / "moves.toml", fmu)
         monkeypatch.chdir(tmp_path)
         assert call("run", "moves.toml", "--out", stage, option) == 0
         made = sorted(str(one.relative_to(tmp_path)) for one in (tmp_path / stage).iterdir())

@@ -36,9 +36,7 @@ DEFINED = {
 }
 """SI brochure, 9th edition, tables 4 and 8; angles are of dimension one."""
 SIZES = {
-    "rpm": 2 * np.pi / 60,
     "deg": np.pi / 180,
-    "arcsec": np.pi / 648_000,
     "mN.m": 1e-3,
     "kN": 1e3,
     "um": 1e-6,
