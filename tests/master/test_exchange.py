@@ -113,21 +113,19 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def flight(t: np.ndarray) -> np.ndarray:
     """Height of the ball in closed form."""
-    g, height, speed, begun = 9.81, 1.0, 0.0, 0.0
-    out, pushed = np.empty_like(t), False
+    g, height, speed, begun, pushed, out = 9.81, 1.0, 0.0, 0.0, False, np.empty_like(t)
     while begun < t[-1]:
         lands = begun + (speed + np.sqrt(speed**2 + 2 * g * height)) / g
         until = lands if pushed or lands < 1.50005 else 1.50005
         s = t - begun
         flying = (t >= begun) & (t < until + 1e-12)
         out[flying] = (height + speed * s - g * s**2 / 2)[flying]
-        s_end = until - begun
-        end = speed - g * s_end
-        if until == 1.50005 and not pushed:
-            height, speed, pushed = height + speed * s_end - g * s_end**2 / 2, end + 1.0, True
+        s, begun = until - begun, until
+        end = speed - g * s
+        if until == 1.50005:
+            height, speed, pushed = height + speed * s - g * s**2 / 2, end + 1.0, True
         else:
             height, speed = 0.0, -0.7 * end
-        begun = until
     return out
 
 

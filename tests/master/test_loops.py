@@ -209,19 +209,15 @@ KINDS = [
 
 
 @BOTH
+@pytest.mark.parametrize("on", ["one.a", "r"])
 @pytest.mark.parametrize(("what", "does"), KINDS)
-def test_a_fault_on_an_input_breaks_its_wire_only(tiny: Tiny, what: Any, does: Any, compiled: bool) -> None:
-    seen = run(tiny[3], fault(on="one.a", **what), compiled=compiled)
-    np.testing.assert_array_equal(seen["a"], np.where(INSIDE, does(2 * RAMP), 2 * RAMP))
-    np.testing.assert_array_equal(seen["b"], RAMP)
-
-
-@pytest.mark.parametrize(("what", "does"), KINDS)
-def test_a_fault_on_a_signal_breaks_all_that_it_feeds(tiny: Tiny, what: Any, does: Any) -> None:
-    wrong = np.where(INSIDE, does(RAMP), RAMP)
-    seen = run(tiny[2], fault(on="r", **what))
-    for name, gain in (("r", 1), ("a", 2), ("b", 1)):
-        np.testing.assert_array_equal(seen[name], gain * wrong)
+def test_a_fault_on_an_input_breaks_its_wire_and_on_a_signal_all_that_it_feeds(
+    tiny: Tiny, on: str, what: Any, does: Any, compiled: bool
+) -> None:
+    seen, wrong = run(tiny[3], fault(on=on, **what), compiled=compiled), np.where(INSIDE, does(RAMP), RAMP)
+    fed = {"a": np.where(INSIDE, does(2 * RAMP), 2 * RAMP), "b": RAMP, "r": RAMP}
+    for name, values in (fed if on == "one.a" else {"a": 2 * wrong, "b": wrong, "r": wrong}).items():
+        np.testing.assert_array_equal(seen[name], values)
 
 
 @pytest.mark.parametrize("on", ["one.b", "r"])
