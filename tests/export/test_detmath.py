@@ -3,6 +3,7 @@
 import ctypes
 import math
 import re
+from itertools import product
 
 import mpmath
 import numpy as np
@@ -99,11 +100,6 @@ def test_a_power_is_within_one_unit_in_the_last_place(library):
     assert worst <= 1
 
 
-def test_small_whole_powers_of_small_whole_numbers_are_exact(library):
-    power = function(library, "pow", 2)
-    assert all(power(base, n) == base**n for base in range(-9, 10) for n in range(16))
-
-
 def same(a, b):
     return (math.isnan(a) and math.isnan(b)) or (a == b and math.copysign(1, a) == math.copysign(1, b))
 
@@ -136,13 +132,6 @@ def test_special_values_follow_annex_f_of_c99(library, name):
     assert {x: tested(x) for x, y in SPECIAL[name].items() if not same(tested(x), y)} == {}
 
 
-def test_powers_of_special_values_are_those_of_python(library):
-    power = function(library, "pow", 2)
-    values = (0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 2.0, -2.0, 3.0, -3.0, 1e300, -1e300, INF, -INF, NAN)
-    wrong = [(x, y) for x in values for y in values if not same(power(x, y), reference_power(x, y))]
-    assert wrong == []
-
-
 def reference_power(x, y):
     try:
         return math.pow(x, y)
@@ -154,38 +143,42 @@ def reference_power(x, y):
         return NAN
 
 
-def test_angles_of_special_points_are_those_of_python(library):
-    angle = function(library, "atan2", 2)
-    values = (0.0, -0.0, 1.0, -1.0, INF, -INF, NAN)
-    wrong = [(y, x) for y in values for x in values if not same(angle(y, x), math.atan2(y, x))]
-    assert wrong == []
+ZEROS, UNITS = (0.0, -0.0), (1.0, -1.0, INF, -INF, NAN)
+BASES = (*ZEROS, *UNITS, 0.5, -0.5, 2.0, -2.0, 3.0, -3.0, 1e300, -1e300)
+FAR_APART = list(zip(decades(-20, 20, 1).tolist(), decades(-20, 20, 2).tolist(), strict=True))
+TINY, HUGE, HALVES = 5e-324, 1.7e308, [n / 2 for n in range(-9, 10)]
+PAIRS = {
+    "pow": (reference_power, [*product(BASES, BASES), *product(range(-9, 10), range(16))]),
+    "atan2": (math.atan2, product((*ZEROS, *UNITS), (*ZEROS, *UNITS))),
+    "fmod": (math.fmod, [*FAR_APART, *product((n * TINY for n in range(-12, 13)), (m * TINY for m in range(1, 8)))]),
+    "remainder": (
+        math.remainder,
+        [
+            *FAR_APART,
+            *((x, y) for x, y in product(HALVES, HALVES) if y),
+            *product((TINY, 3 * TINY, -7 * TINY, HUGE, -0.7 * HUGE, *ZEROS), (TINY, 2 * TINY, HUGE, INF)),
+        ],
+    ),
+}
 
 
-def test_remainders_hypotenuse_and_extremes_are_those_of_python(library):
-    fmod, hypot = function(library, "fmod", 2), function(library, "hypot", 2)
-    pairs = list(zip(decades(-20, 20, 1).tolist(), decades(-20, 20, 2).tolist(), strict=True))
-    pairs += [(n * 5e-324, m * 5e-324) for n in range(-12, 13) for m in range(1, 8)]
-    assert all(fmod(x, y) == math.fmod(x, y) for x, y in pairs)
-    pairs = pairs[:COUNT]
-    assert all(hypot(x, y) == pytest.approx(math.hypot(x, y), rel=4e-16, abs=0) for x, y in pairs)
+@pytest.mark.parametrize("name", PAIRS)
+def test_functions_of_two_numbers_are_those_of_python(library, name):
+    """Powers and angles of special values, small whole powers exactly, remainders of any two."""
+    (reference, pairs), tested = PAIRS[name], function(library, name, 2)
+    assert [pair for pair in pairs if not same(tested(*pair), reference(*pair))] == []
+
+
+def test_hypotenuse_extremes_signs_and_remainders_of_nothing(library):
+    hypot, remainder = function(library, "hypot", 2), function(library, "remainder", 2)
+    assert all(hypot(x, y) == pytest.approx(math.hypot(x, y), rel=4e-16, abs=0) for x, y in FAR_APART)
     assert hypot(3e300, 4e300) == pytest.approx(5e300, rel=4e-16)
+    assert all(math.isnan(remainder(x, y)) for x, y in ((1.0, 0.0), (INF, 1.0), (NAN, 1.0), (1.0, NAN)))
     assert function(library, "fmin", 2, "inline")(NAN, 1.0) == 1.0
     assert function(library, "fmax", 2, "inline")(-1.0, NAN) == -1.0
     sign = function(library, "sign", 1, "inline")
     assert [sign(x) for x in (-3.0, 1e-300, 0.0, INF)] == [-1.0, 1.0, 0.0, 1.0]
     assert math.isnan(sign(NAN))
-
-
-def test_the_remainder_is_that_of_python(library):
-    remainder, whole = function(library, "remainder", 2), [n / 2 for n in range(-9, 10)]
-    tiny, huge = 5e-324, 1.7e308
-    pairs = list(zip(decades(-20, 20, 1).tolist(), decades(-20, 20, 2).tolist(), strict=True))
-    pairs += [(x, y) for x in whole for y in whole if y]
-    pairs += [
-        (x, y) for x in (tiny, 3 * tiny, -7 * tiny, huge, -0.7 * huge, 0.0, -0.0) for y in (tiny, 2 * tiny, huge, INF)
-    ]
-    assert [pair for pair in pairs if not same(remainder(*pair), math.remainder(*pair))] == []
-    assert all(math.isnan(remainder(x, y)) for x, y in ((1.0, 0.0), (INF, 1.0), (NAN, 1.0), (1.0, NAN)))
 
 
 def test_tables_are_their_definitions_rounded_to_nearest():

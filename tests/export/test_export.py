@@ -1,31 +1,35 @@
-"""Archives: valid in an outside tool, right in both interfaces."""
+"""Archives: valid in an outside tool, right in both interfaces, self-contained, the same wherever they are made."""
 
+import ctypes
+import importlib
+import os
 import re
-import xml.etree.ElementTree as ET
+import shutil
+import subprocess
+import sys
+import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cache
-from itertools import combinations
 from pathlib import Path
 
 import export_models as models
-import fmpy
 import numpy as np
 import pytest
 from archives import EXPORTED, archive, of_case
-from effect_examples import EXAMPLES, mount
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
-from friction_laws import EXAMPLES as LAWS
-from lxml import etree
+from fmu_tools import TOOLS
 from scipy.integrate import solve_ivp
 
 from pyfmi_models.card import read_card
+from pyfmi_models.errors import ExportError
+from pyfmi_models.export import build, build_library, export_fmu
+from pyfmi_models.export.build import compile_shared, fmi_headers, sources_of
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.description import fmi2_description, fmi3_description
-from pyfmi_models.export.diagram import diagram
-from pyfmi_models.export.documentation import documentation
 from pyfmi_models.export.platforms import PLATFORMS, host
-from pyfmi_models.export.prose import formula, prose
 
 __all__ = ["archive"]
 ALL = (models.lugre, models.van_der_pol, models.oscillator, models.controller)
@@ -49,20 +53,6 @@ def test_every_law_effect_and_case_has_a_valid_description(name, fmi, tmp_path):
     assert validate_fmu(str(tmp_path / "a.fmu")) == []
 
 
-@cache
-def reference(case):
-    """The states at the end of a case by an implicit method at its tightest."""
-    make, end, inputs, given, _ = CASES[case]
-    model, drive = make(), list(inputs.values())
-    start = [given.get(state.name, state.start) for state in model.states]
-    parameters = [given.get(parameter.name, parameter.start) for parameter in model.parameters]
-
-    def rates(t, x):
-        return np.array(model.equations(t, x, drive, parameters)[0]).ravel()
-
-    return solve_ivp(rates, (0, end), start, method="Radau", rtol=1e-11, atol=1e-14).y[:, -1]
-
-
 # model: end, inputs, start values, sizes to compare with
 CASES = {
     "slip": (models.lugre, 0.5, {"drive": 5.0}, {}, (1e-2, 1e-1, 1e-5)),
@@ -81,8 +71,11 @@ CASES = {
 def test_both_interfaces_agree_with_a_tight_implicit_method(archive, case, kind, fmi):
     make, end, inputs, start, sizes = CASES[case]
     model = make()
-    names = [state.name for state in model.states]
-    exact = reference(case)
+    names, drive = [state.name for state in model.states], list(inputs.values())
+    x, p = ([start.get(one.name, one.start) for one in group] for group in (model.states, model.parameters))
+    exact = solve_ivp(
+        lambda t, x: np.array(model.equations(t, x, drive, p)[0]).ravel(), (0, end), x, "Radau", rtol=1e-11, atol=1e-14
+    ).y[:, -1]
     result = simulate_fmu(
         str(archive(make, fmi)), fmi_type=kind, stop_time=end, output_interval=end / 1000, output=names,
         start_values=inputs | start, relative_tolerance=1e-11 if kind == "ModelExchange" else 1e-9,
@@ -116,117 +109,138 @@ def test_in_model_exchange_ticks_are_time_events(archive, fmi):
     assert np.allclose(result["moment"], ticks * 1e-3, rtol=0, atol=1e-15)
 
 
-# What an archive says of itself: sources, licences, icon, and a page with equations and a figure.
+# Built on this machine: from what, once, and refused in one sentence.
 
 
-def test_the_archive_holds_sources_and_a_page(archive):
-    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
-        names = set(file.namelist())
-        page = file.read("documentation/index.html").decode()
-    binary = f"lugre{PLATFORMS[host()].suffix}"
-    sources = {"model.c", "equations.c", "fmi3Functions.h", "buildDescription.xml", "detmath.c"}
-    assert {f"binaries/{host()}/{binary}", *(f"sources/{name}" for name in sources)} <= names
-    assert "friction.sigma0" in page
-    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
-        assert f"binaries/{PLATFORMS[host()].fmi2}/{binary}" in file.namelist()
+def test_the_binary_needs_libc_alone_and_exports_every_function_of_both_headers_and_nothing_else():
+    library = build_library(models.lugre())
+
+    def listed(*command):
+        return subprocess.run([*command, str(library)], capture_output=True, text=True, check=True).stdout.splitlines()
+
+    assert [line.split("[")[1].rstrip("]") for line in listed("readelf", "-d") if "NEEDED" in line] == ["libc.so.6"]
+    assert [line for line in listed("nm", "-D", "--defined-only") if " fmi2" not in line and " fmi3" not in line] == []
+    text = b"".join(fmi_headers()[f"fmi{n}FunctionTypes.h"] for n in (2, 3)).decode()
+    names = re.findall(r"^\s*typedef \S.*?\b(fmi[23]\w+)TYPE\s*\(", text, re.M)
+    assert len(names) == 119
+    assert [name for name in names if not hasattr(ctypes.CDLL(str(library)), name)] == []
 
 
-def page(model):
-    return documentation(generate(model), ("x86_64-linux",))["documentation/index.html"].decode()
+def test_our_c_compiles_without_a_warning():
+    sources = sources_of(generate(models.lugre()))
+    flags = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable", "-c")
+    headers = {name: text for name, text in sources.items() if name.endswith(".h")}
+    for name in [name for name in sources if name.endswith(".c") and name not in ("model.c", "equations.c")]:
+        compile_shared({**headers, name: sources[name]}, f"{name}.o", PLATFORMS[host()].target, flags)
 
 
-def test_the_page_shows_equations_parameters_units_and_a_figure_and_needs_no_network():
-    text = page(read_card("paper_mount").plant().model())
-    assert "dz/dt = v − σ<sub>0</sub> |v| z / g(v)" in text
-    assert "<svg" in text
-    for name, value in {"friction.sigma0": "92300", "friction.Vs": "0.04129"}.items():
-        assert re.search(rf"<code>{re.escape(name)}</code></td><td>[^<]+</td><td class=\"number\">{value}<", text)
-    assert "kg m² s⁻² rad⁻¹" in text
-    for heading in ("Solver and time", "Limits", "How it was validated", "Build it from its sources", "Licences"):
-        assert f"<h2>{heading}</h2>" in text
-    assert re.findall(r"(?:src|href)=|@import|url\((?!#)", text) == []
+def test_an_unchanged_model_is_only_looked_up(monkeypatch):
+    built = build_library(models.lugre())
+    monkeypatch.setattr(build, "_build", None)
+    assert build_library(models.lugre()) == built
 
 
-def test_the_description_of_a_plant_names_its_parts():
-    chosen = [one for one in EXAMPLES if one.id in ("backlash", "torque_offset")]
-    assert mount(
-        *chosen, friction=LAWS["lugre"]
-    ).model().description == "m: one axis with lugre friction, " + ", ".join(one.id.replace("_", " ") for one in chosen)
-    assert mount(friction=LAWS["none"]).model().description == "m: one axis with no friction"
+def test_several_builds_at_once_agree():
+    fresh = replace(models.oscillator(), description=f"Built at {time.time_ns()}.")
+    with ThreadPoolExecutor(2) as pool:
+        libraries = list(pool.map(build_library, [fresh] * 2))
+    assert len(set(libraries)) == 1
+    assert list(libraries[0].parent.iterdir()) == [libraries[0]]
+    assert models.Driver(fresh, libraries[0], 3).start().step(0, 0.1) == "ok"
+    libraries[0].unlink()
+    libraries[0].parent.rmdir()
 
 
-def test_the_page_says_only_starts_and_ranges_that_there_are():
-    """Outputs of a plant are calculated, those of a controller hold their start value until the first tick."""
-    heads = {}
-    for part, model in (("plant", mount(*EXAMPLES).model()), ("controller", of_case("C2a"))):
-        tables = r"<h2>(\w+)</h2>\n<div class=\"wide\"[^>]*><table>(.*?)</table>"
-        for title, body in re.findall(tables, page(model), re.S):
-            rows = body.strip().split("</tr>")
-            heads[part, title] = re.findall(r"<th[^>]*>(\w+)", rows[0])
-            assert {row.count("<td") for row in rows[1:-1]} == {len(heads[part, title])} or title == "Units"
-    assert heads["plant", "Outputs"] == ["Name", "Unit", "Description"]
-    assert heads["controller", "Outputs"] == ["Name", "Unit", "Start", "Description"]
-    assert heads["plant", "Parameters"] == ["Name", "Unit", "Start", "Range", "Description"]
-    assert f"more than {generate(of_case('C2a')).most_steps:,} ticks".replace(",", " ") in page(of_case("C2a"))
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_plain_gcc_makes_the_same_fmu_of_the_sources(archive, tmp_path, fmi):
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("gcc is not installed")
+    with zipfile.ZipFile(archive(models.lugre, fmi)) as file:
+        file.extractall(tmp_path)
+    (configuration,) = read_model_description(str(tmp_path)).buildConfigurations
+    names = [name for group in configuration.sourceFileSets for name in group.sourceFiles]
+    (binary,) = (tmp_path / "binaries").glob("*/*")
+    before = binary.read_bytes()
+    subprocess.run([compiler, "-std=c11", "-O2", "-fPIC", "-shared", *names, "-o", str(binary), "-lm"], check=True,
+                   cwd=tmp_path / "sources")  # fmt: skip
+    assert binary.read_bytes() != before
+    runs = [simulate_fmu(str(path), stop_time=0.2, output_interval=1e-3, start_values={"drive": 5.0})
+            for path in (archive(models.lugre, fmi), tmp_path)]  # fmt: skip
+    assert np.abs(runs[0]["torque"]).max() > 2
+    assert runs[0].tobytes() == runs[1].tobytes()
 
 
-@pytest.mark.parametrize("name", EXPORTED)
-def test_every_part_of_a_model_has_a_chapter_and_a_place_in_the_figure(name):
-    what = EXPORTED[name]
-    model = of_case(what) if isinstance(what, str) else what.model()
-    figure = ET.fromstring(diagram(model))
-    shown = [text.text for text in figure.iter("{http://www.w3.org/2000/svg}text")]
-    assert {chapter.title for chapter in model.chapters} | {chapter.place for chapter in model.chapters} <= set(shown)
-    assert len(model.chapters) >= (2 if isinstance(what, str) else 2 + len(what.effects))
-    assert all(chapter.text for chapter in model.chapters)
-
-
-def test_boxes_of_the_figure_do_not_overlap():
-    figure = ET.fromstring(diagram(mount(*EXAMPLES).model()))
-    boxes = [[float(box.get(key)) for key in ("x", "y", "width", "height")]
-             for box in figure.iter("{http://www.w3.org/2000/svg}rect")]  # fmt: skip
-    assert len(boxes) == 7
-    for (x, y, w, h), (p, q, v, g) in combinations(boxes, 2):
-        assert x + w <= p or p + v <= x or y + h <= q or q + g <= y
-
-
-FORMULAS = {
-    "sigma0 z + sigma1 dz/dt": "σ<sub>0</sub> z + σ<sub>1</sub> dz/dt",
-    "exp(-|v/Vs|^delta)": "exp(−|v/Vs|<sup>δ</sup>)",
-    "J_far (2 pi fa)^2": "J<sub>far</sub> (2 π fa)<sup>2</sup>",
-    "warm_up_degC - rise <= 1e4": "warm_up_degC − rise ≤ 1e4",
-    "(1 - b)^3/h^2 r": "(1 − b)<sup>3</sup>/h<sup>2</sup> r",
-}
-
-
-@pytest.mark.parametrize("text", FORMULAS)
-def test_formulas_are_set_to_be_read(text):
-    assert formula(text) == FORMULAS[text]
-
-
-def test_prose_shows_symbols_as_formulas_do_and_leaves_names_and_words():
-    text = "The sigma0 of `friction.sigma0` < tau_f; delta and zeta1_last are words, mu2 is not."
-    assert prose(text) == (
-        "<p>The σ₀ of <code>friction.sigma0</code> &lt; tau_f; delta and zeta1_last are words, μ₂ is not.</p>"
+def test_an_archive_made_elsewhere_by_an_empty_cache_is_the_same(archive, tmp_path):
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import export_models as models;"
+        "from pyfmi_models.export import export_fmu; from pathlib import Path;"
+        "export_fmu(models.lugre(), Path('here.fmu'), fmi=3)"
     )
+    environment = os.environ | {
+        "PYTHONHASHSEED": "77", "MOUNT_COSIM_CACHE": str(tmp_path / "cache"), "TZ": "Asia/Tokyo", "LC_ALL": "C",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }  # fmt: skip
+    tests = str(Path(models.__file__).parent)
+    subprocess.run([sys.executable, "-W", "error", "-c", code, tests], cwd=tmp_path, env=environment, check=True)
+    assert (tmp_path / "here.fmu").read_bytes() == archive(models.lugre, 3).read_bytes()
+    with zipfile.ZipFile(tmp_path / "here.fmu") as file:
+        assert {entry.date_time for entry in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert file.namelist() == sorted(file.namelist())
 
 
-def test_licences_of_all_that_is_inside_are_inside(archive):
-    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
-        ours, headers = (
-            file.read(f"documentation/licenses/{name}.txt").decode() for name in ("license", "fmi-headers")
-        )
-    root = Path(__file__).parents[2]
-    assert ours == (root / "LICENSE").read_text()
-    assert "Modelica Association" in headers
-    assert "Redistributions of source code must retain" in headers
+def test_an_archive_for_one_machine_is_small(archive):
+    assert all(archive(models.lugre, fmi).stat().st_size < 200_000 for fmi in (2, 3))
 
 
-def test_the_archive_shows_an_icon_that_other_tools_find(archive):
-    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
-        assert file.read("model.png").startswith(b"\x89PNG")
-    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
-        icon, text = (file.read(f"terminalsAndIcons/{name}") for name in ("icon.png", "terminalsAndIcons.xml"))
-    assert icon.startswith(b"\x89PNG")
-    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
-    etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))
+def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "file"))
+    with pytest.raises(ExportError, match=r"cannot build in .*file.*set MOUNT_COSIM_CACHE"):
+        build_library(models.oscillator())
+
+
+def test_a_compiler_error_is_passed_on():
+    with pytest.raises(ExportError, match=r"the C compiler failed on broken\.so .*error: "):
+        compile_shared({"broken.c": b"int main(void) { return missing; }"}, "broken.so", PLATFORMS[host()].target)
+
+
+def test_nothing_is_overwritten_without_force(tmp_path):
+    path = export_fmu(models.oscillator(), tmp_path / "a.fmu")
+    with pytest.raises(ExportError, match="exists; use force"):
+        export_fmu(models.oscillator(), path)
+    assert export_fmu(models.oscillator(), path, force=True) == path
+    assert list(tmp_path.iterdir()) == [path]
+
+
+# In tools of others: they load, and compute the same bits.
+
+CASES_OF_TOOLS = [(tool, fmi) for tool, (_, versions) in TOOLS.items() for fmi in versions]
+
+
+@pytest.fixture(scope="module")
+def mounts(tmp_path_factory):
+    """Export plant or controller of the paper's mount once."""
+    card, folder = read_card("paper_mount"), tmp_path_factory.mktemp("fmus")
+    models = {"plant": card.plant().model(), "controller": card.controller_model()}
+    return cache(lambda part, fmi: export_fmu(models[part], folder / f"{part}{fmi}.fmu", fmi=fmi))
+
+
+def rows_in(tool, path, folder):
+    try:
+        importlib.import_module(TOOLS[tool][0])
+    except (ImportError, OSError) as error:
+        pytest.skip(f"{tool} is not installed: {error}")
+    runner, out = Path(__file__).parents[1] / "tools" / "fmu_tools.py", folder / f"{tool}.npz"
+    command = [sys.executable, str(runner), tool, str(path), "100", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return np.load(out)["rows"]
+
+
+@pytest.mark.parametrize("part", ["plant", "controller"])
+@pytest.mark.parametrize(("tool", "fmi"), CASES_OF_TOOLS)
+def test_each_tool_loads_the_archive_and_finds_the_same_bits(mounts, tool, fmi, part, tmp_path):
+    own = rows_in("fmpy", mounts(part, 3), tmp_path)
+    assert np.ptp(own[:, 0]) > 0  # something moves
+    assert rows_in(tool, mounts(part, fmi), tmp_path).tobytes() == own.tobytes()

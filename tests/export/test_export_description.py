@@ -1,21 +1,33 @@
-"""The description says of variables what is true: dependencies, kinds, times, units to show."""
+"""What an archive says of itself is true: dependencies, kinds, units; sources, licences, a page with a figure."""
 
 import re
+import xml.etree.ElementTree as ET
+import zipfile
 from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
 
 import casadi as ca
 import export_models as models
+import fmpy
 import numpy as np
 import pytest
-from archives import archive
+from archives import EXPORTED, archive, of_case
+from effect_examples import EXAMPLES, mount
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from friction_laws import EXAMPLES as LAWS
+from lxml import etree
 
 from pyfmi_models.card import read_card
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.export.codegen import generate
+from pyfmi_models.export.diagram import diagram
+from pyfmi_models.export.documentation import documentation
 from pyfmi_models.export.layout import layout_of
+from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.prose import formula, prose
 from pyfmi_models.export.structure import unknowns_of
 from pyfmi_models.export.units import BASE, parse_unit
 
@@ -23,16 +35,13 @@ __all__ = ["archive"]
 
 
 def structure(path):
-    description = read_model_description(str(path))
-    groups = {"outputs": description.outputs, "derivatives": description.derivatives,
-              "initial": description.initialUnknowns}  # fmt: skip
-    return {
-        group: {
-            u.variable.name: dict(zip([d.name for d in u.dependencies], u.dependenciesKind, strict=True))
-            for u in unknowns
-        }
-        for group, unknowns in groups.items()
-    }
+    read = read_model_description(str(path))
+    groups = {"outputs": read.outputs, "derivatives": read.derivatives, "initial": read.initialUnknowns}
+
+    def said(unknown):
+        return dict(zip([one.name for one in unknown.dependencies], unknown.dependenciesKind, strict=True))
+
+    return {group: {one.variable.name: said(one) for one in unknowns} for group, unknowns in groups.items()}
 
 
 CONSTANT, FIXED, TUNABLE, DEPENDENT = "constant", "fixed", "tunable", "dependent"
@@ -59,15 +68,10 @@ def test_a_factor_that_is_fixed_or_jumps_is_told_from_one_that_can_be_tuned(tmp_
     fixed = (replace(model.parameters[0], tunable=False, low=0.5),)
     path = export_fmu(replace(model, equations=equations, parameters=fixed), tmp_path / "a.fmu")
     found = structure(path)
-    assert found["derivatives"] == {
-        "der(position)": {"position": DEPENDENT, "velocity": DEPENDENT},
-        "der(velocity)": {"force": FIXED},
-    }
-    assert found["outputs"] == {
-        "where": {"position": DEPENDENT},
-        "direct": {"force": DEPENDENT},
-        "clock": {"position": DEPENDENT, "velocity": FIXED},
-    }
+    rates = {"der(position)": {"position": DEPENDENT, "velocity": DEPENDENT}, "der(velocity)": {"force": FIXED}}
+    outputs = {"where": {"position": DEPENDENT}, "direct": {"force": DEPENDENT}}
+    assert found["derivatives"] == rates
+    assert found["outputs"] == outputs | {"clock": {"position": DEPENDENT, "velocity": FIXED}}
     assert validate_fmu(str(path)) == []
 
 
@@ -117,13 +121,11 @@ def test_variables_say_what_they_are(archive, fmi):
     assert found["der(z)"].derivative.name == "z"
     assert (found["der(speed)"].unit, found["der(angle)"].unit) == ("rad/s2", "rad/s")
     assert (description.defaultExperiment.stepSize, description.defaultExperiment.tolerance) == ("0.0001", "1e-08")
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_time_is_the_one_independent_variable_and_has_no_start(archive, fmi):
-    description = read_model_description(str(archive(models.controller, fmi)))
     independent = [v for v in description.modelVariables if v.causality == "independent"]
     assert [(v.name, v.unit, v.variability, v.start) for v in independent] == [("time", "s", "continuous", None)]
+    units = {unit.name: {d.name: float(d.factor) for d in unit.displayUnits} for unit in description.unitDefinitions}
+    assert found["z"].displayUnit == "arcsec", "small angles"
+    assert units["rad"]["arcsec"] * np.pi / 180 == pytest.approx(3600, rel=1e-15)
 
 
 DISPLAYED = {
@@ -140,13 +142,6 @@ def test_display_units_are_those_of_the_field(tmp_path, card, fmi):
     found = {v.name: v.displayUnit for v in description.modelVariables}
     assert {name: found.get(name) for name in DISPLAYED[card]} == DISPLAYED[card]
     assert validate_fmu(str(path)) == []
-
-
-def test_small_angles_are_shown_in_arcseconds(archive):
-    description = read_model_description(str(archive(models.lugre, 3)))
-    units = {unit.name: {d.name: float(d.factor) for d in unit.displayUnits} for unit in description.unitDefinitions}
-    assert {v.name: v.displayUnit for v in description.modelVariables}["z"] == "arcsec"
-    assert units["rad"]["arcsec"] * np.pi / 180 == pytest.approx(3600, rel=1e-15)
 
 
 @pytest.mark.parametrize("kind", ["CS", "ME"])
@@ -206,7 +201,10 @@ def test_an_unknown_unit_is_named(name, culprit):
         parse_unit(name)
 
 
+OF_NO_BIT = ca.Function("f", one := models.symbols(2, 1, 1), [ca.vertcat(ca.erf(one[1][0]), 0), ca.vertcat(0, 0, 0)])
+"""A function without a deterministic version."""
 BROKEN = {
+    "uses erf": {"equations": OF_NO_BIT},
     "two variables": {"outputs": (models.variable("force"), models.variable("b"), models.variable("c"))},
     'called "time"': {"inputs": (models.variable("time"),)},
     "start value": {"parameters": (models.variable("stiffness", start=-1.0, low=0.0),)},
@@ -222,15 +220,6 @@ def test_a_broken_model_is_refused_in_one_sentence(message):
         generate(replace(models.oscillator(), **BROKEN[message]))
 
 
-def test_a_function_without_a_deterministic_version_is_named():
-    model = models.oscillator()
-    arguments = models.symbols(2, 1, 1)
-    rates = ca.vertcat(ca.erf(arguments[1][0]), 0)
-    equations = ca.Function("equations", arguments, [rates, ca.vertcat(0, 0, 0)])
-    with pytest.raises(ExportError, match="uses erf"):
-        generate(replace(model, equations=equations))
-
-
 def test_equations_may_also_be_matrix_expressions():
     scalar = models.oscillator()
     arguments = [ca.MX.sym(name, size) for name, size in zip("txup", (1, 2, 1, 1), strict=True)]
@@ -239,3 +228,113 @@ def test_equations_may_also_be_matrix_expressions():
     )
     runs = [models.Driver(m, build_library(m), 3).start(force=0.2).run(0, 50, 0.02) for m in (scalar, model)]
     assert np.array_equal(runs[0].get("position", "velocity"), runs[1].get("position", "velocity"))
+
+
+# Sources, licences, icon, and a page with equations and a figure.
+
+
+def test_the_archive_holds_sources_a_page_and_the_licences_of_all_that_is_inside(archive):
+    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
+        names = set(file.namelist())
+        page, ours, headers = (
+            file.read(f"documentation/{name}").decode()
+            for name in ("index.html", "licenses/license.txt", "licenses/fmi-headers.txt")
+        )
+    binary = f"lugre{PLATFORMS[host()].suffix}"
+    sources = {"model.c", "equations.c", "fmi3Functions.h", "buildDescription.xml", "detmath.c"}
+    assert {f"binaries/{host()}/{binary}", *(f"sources/{name}" for name in sources)} <= names
+    assert "friction.sigma0" in page
+    assert ours == (Path(__file__).parents[2] / "LICENSE").read_text()
+    assert "Modelica Association" in headers
+    assert "Redistributions of source code must retain" in headers
+    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
+        assert f"binaries/{PLATFORMS[host()].fmi2}/{binary}" in file.namelist()
+
+
+def page(model):
+    return documentation(generate(model), ("x86_64-linux",))["documentation/index.html"].decode()
+
+
+def test_the_page_shows_equations_parameters_units_and_a_figure_and_needs_no_network():
+    text = page(read_card("paper_mount").plant().model())
+    assert "dz/dt = v − σ<sub>0</sub> |v| z / g(v)" in text
+    assert "<svg" in text
+    for name, value in {"friction.sigma0": "92300", "friction.Vs": "0.04129"}.items():
+        assert re.search(rf"<code>{re.escape(name)}</code></td><td>[^<]+</td><td class=\"number\">{value}<", text)
+    assert "kg m² s⁻² rad⁻¹" in text
+    for heading in ("Solver and time", "Limits", "How it was validated", "Build it from its sources", "Licences"):
+        assert f"<h2>{heading}</h2>" in text
+    assert re.findall(r"(?:src|href)=|@import|url\((?!#)", text) == []
+
+
+def test_the_description_of_a_plant_names_its_parts():
+    chosen = [one for one in EXAMPLES if one.id in ("backlash", "torque_offset")]
+    said = ", ".join(one.id.replace("_", " ") for one in chosen)
+    assert mount(*chosen, friction=LAWS["lugre"]).model().description == f"m: one axis with lugre friction, {said}"
+    assert mount(friction=LAWS["none"]).model().description == "m: one axis with no friction"
+
+
+def test_the_page_says_only_starts_and_ranges_that_there_are():
+    """Outputs of a plant are calculated, those of a controller hold their start value until the first tick."""
+    heads = {}
+    for part, model in (("plant", mount(*EXAMPLES).model()), ("controller", of_case("C2a"))):
+        tables = r"<h2>(\w+)</h2>\n<div class=\"wide\"[^>]*><table>(.*?)</table>"
+        for title, body in re.findall(tables, page(model), re.S):
+            rows = body.strip().split("</tr>")
+            heads[part, title] = re.findall(r"<th[^>]*>(\w+)", rows[0])
+            assert {row.count("<td") for row in rows[1:-1]} == {len(heads[part, title])} or title == "Units"
+    assert heads["plant", "Outputs"] == ["Name", "Unit", "Description"]
+    assert heads["controller", "Outputs"] == ["Name", "Unit", "Start", "Description"]
+    assert heads["plant", "Parameters"] == ["Name", "Unit", "Start", "Range", "Description"]
+    assert f"more than {generate(of_case('C2a')).most_steps:,} ticks".replace(",", " ") in page(of_case("C2a"))
+
+
+@pytest.mark.parametrize("name", EXPORTED)
+def test_every_part_of_a_model_has_a_chapter_and_a_place_in_the_figure(name):
+    what = EXPORTED[name]
+    model = of_case(what) if isinstance(what, str) else what.model()
+    figure = ET.fromstring(diagram(model))
+    shown = [text.text for text in figure.iter("{http://www.w3.org/2000/svg}text")]
+    assert {chapter.title for chapter in model.chapters} | {chapter.place for chapter in model.chapters} <= set(shown)
+    assert len(model.chapters) >= (2 if isinstance(what, str) else 2 + len(what.effects))
+    assert all(chapter.text for chapter in model.chapters)
+
+
+def test_boxes_of_the_figure_do_not_overlap():
+    figure = ET.fromstring(diagram(mount(*EXAMPLES).model()))
+    boxes = [[float(box.get(key)) for key in ("x", "y", "width", "height")]
+             for box in figure.iter("{http://www.w3.org/2000/svg}rect")]  # fmt: skip
+    assert len(boxes) == 7
+    for (x, y, w, h), (p, q, v, g) in combinations(boxes, 2):
+        assert x + w <= p or p + v <= x or y + h <= q or q + g <= y
+
+
+FORMULAS = {
+    "sigma0 z + sigma1 dz/dt": "σ<sub>0</sub> z + σ<sub>1</sub> dz/dt",
+    "exp(-|v/Vs|^delta)": "exp(−|v/Vs|<sup>δ</sup>)",
+    "J_far (2 pi fa)^2": "J<sub>far</sub> (2 π fa)<sup>2</sup>",
+    "warm_up_degC - rise <= 1e4": "warm_up_degC − rise ≤ 1e4",
+    "(1 - b)^3/h^2 r": "(1 − b)<sup>3</sup>/h<sup>2</sup> r",
+}
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_formulas_are_set_to_be_read(text):
+    assert formula(text) == FORMULAS[text]
+
+
+def test_prose_shows_symbols_as_formulas_do_and_leaves_names_and_words():
+    text = "The sigma0 of `friction.sigma0` < tau_f; delta and zeta1_last are words, mu2 is not."
+    assert prose(text) == (
+        "<p>The σ₀ of <code>friction.sigma0</code> &lt; tau_f; delta and zeta1_last are words, μ₂ is not.</p>"
+    )
+
+
+def test_the_archive_shows_an_icon_that_other_tools_find(archive):
+    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
+        assert file.read("model.png").startswith(b"\x89PNG")
+    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
+        icon, text = (file.read(f"terminalsAndIcons/{name}") for name in ("icon.png", "terminalsAndIcons.xml"))
+    assert icon.startswith(b"\x89PNG")
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))

@@ -1,30 +1,34 @@
-"""The firmware of a card computes the bits of its FMU, fits in what is stated, and gives no torque on doubt."""
+"""Firmware computes the bits of its FMU, of what was learned too, fits in what is stated, gives no torque on doubt."""
 
 import json
 import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import casadi as ca
 import firmware_tools as tools
 import numpy as np
 import pytest
 from commands import call
-from firmware_tools import ENABLE, FAULT, OFF, ON, RESET
+from firmware_tools import ENABLE, FAULT, INPUT, OFF, ON, OUTPUT, PERIOD, RESET
 from on_hardware import recorded, session
 
 from cosim.hardware.session import run_session
 from pyfmi_models.card import Card, read_card
+from pyfmi_models.effects.base import Motion
+from pyfmi_models.effects.learned import LearnedFriction
+from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.build import compile_shared
 from pyfmi_models.export.firmware import Project, firmware, target_of
 from pyfmi_models.export.objects import footprint
 from pyfmi_models.export.platforms import host
+from pyfmi_models.model import Model, Variable
 
 pytestmark = pytest.mark.skipif(not host().endswith("-linux"), reason="firmware for the host is for Linux")
 TARGETS = ("host", "cortex-a9")
-STEPS = 20_000
-"""Times five outputs: 100 000 numbers."""
 
 
 @cache
@@ -44,7 +48,8 @@ def program(target: str) -> Path:
 
 
 @cache
-def rows(count: int = STEPS + 2, frequency: float = 1.0) -> np.ndarray:
+def rows(count: int = 20_002, frequency: float = 1.0) -> np.ndarray:
+    """Times five outputs: 100 000 numbers."""
     return tools.samples(paper(), count, frequency)
 
 
@@ -178,9 +183,7 @@ def test_the_deepest_chain_of_calls_and_what_is_reached_are_added_up(name: str) 
         footprint(objects, "start")
 
 
-def test_the_command_writes_a_project_that_names_its_size_and_overwrites_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_a_project_that_names_its_size_and_overwrites_nothing(tmp_path: Path, capsys: Any) -> None:
     words = ("hardware", "firmware", "paper_mount", "--target", "host", "--out", str(tmp_path / "out"))
     assert call(*words, "--json") == 0
     found = json.loads(capsys.readouterr().out)
@@ -194,18 +197,25 @@ def test_the_command_writes_a_project_that_names_its_size_and_overwrites_nothing
     assert call(*words, "--force") == 0
 
 
-def test_what_cannot_be_firmware_is_refused_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = str(tmp_path / "out")
-    card = tmp_path / "blind.toml"
-    card.write_text('[mount]\ninertia = 1.0\n[friction]\nmodel = "none"\n[controller]\nkp = 1.0\nkd = 1.0\n')
-    for words, sentence in (
+BLIND = '[mount]\ninertia = 1.0\n[friction]\nmodel = "none"\n[controller]\nkp = 1.0\nkd = 1.0\n'
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
         (("emps",), "there is no [controller] section"),
-        ((str(card),), "[encoder] counts_per_rev is missing; a firmware reads counts"),
+        (("blind.toml",), "[encoder] counts_per_rev is missing; a firmware reads counts"),
         (("paper_mount", "--target", "vax"), 'firmware target "vax" is unknown; there are: cortex-a9, host'),
-    ):
-        assert call("hardware", "firmware", *words, "--out", out) == 2
-        assert sentence in " ".join(capsys.readouterr().err.split())
-    assert not (tmp_path / "out").exists()
+    ],
+)
+def test_what_cannot_be_firmware_is_refused_in_one_sentence(
+    words: tuple[str, ...], sentence: str, tmp_path: Path, capsys: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("blind.toml").write_text(BLIND)
+    assert call("hardware", "firmware", *words, "--out", "out") == 2
+    assert sentence in " ".join(capsys.readouterr().err.split())
+    assert not Path("out").exists()
 
 
 def test_a_model_that_is_not_sampled_or_lacks_the_encoder_is_refused() -> None:
@@ -215,3 +225,49 @@ def test_a_model_that_is_not_sampled_or_lacks_the_encoder_is_refused() -> None:
         firmware(plant, host_target, encoder="q", **given)
     with pytest.raises(ExportError, match='has no input "angle"; there are: q, q_d, v_d, a_d'):
         firmware(controller, host_target, encoder="angle", **given)
+
+
+# What was learned: friction and a drive's curve, sampled.
+
+FRICTION = LearnedFriction(over="position", seen=(-0.02, 0.02), level_change=(0.1, 0.3, -0.2, 0.05))
+DRIVE = LearnedDrive(command_seen=(-20.0, 20.0), missing=(0.0, 0.4, 0.1, -0.05))
+QUANTUM, LEVEL = 1e-8, 3.0
+
+
+def ahead() -> Model:
+    """The torque that a drive gives of what friction takes at a set point: both as they were learned."""
+    t, x, u, p = (ca.SX.sym(name, size) for name, size in (("t", 1), ("x", 0), ("u", 4), ("p", 0)))
+    level = FRICTION.level(LEVEL, Motion(t, u[0], u[2], u[0])) * ca.tanh(u[2] / 0.01)
+    given = ca.vertcat(DRIVE.applied((), level), level)
+    inputs, outputs = (
+        tuple(Variable(name=name, unit="1", description=name) for name in names)
+        for names in ((INPUT, "position_d", "velocity_d", "acceleration_d"), (OUTPUT, "level"))
+    )
+    equations = ca.Function("equations", [t, x, u, p], [ca.SX(0, 1), given])
+    kinds = {"inputs": inputs, "parameters": (), "states": (), "outputs": outputs}
+    return Model(name="ahead", description="Friction ahead", equations=equations, period=PERIOD, **kinds)
+
+
+def beyond() -> np.ndarray:
+    """A reset, a start, then a sine over half as much again as what was seen."""
+    t = PERIOD * np.arange(4000)
+    q, v = 0.03 * np.sin(20 * t), 0.6 * np.cos(20 * t)
+    counts, request = np.round(q / QUANTUM), np.full(t.size, ENABLE)
+    request[0], request[1] = 0, RESET
+    columns = (np.mod(counts, 2**32), request, 0 * t, counts, q, v, -20 * v)
+    return np.ascontiguousarray(np.column_stack(columns), float)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_was_learned_gives_the_bits_of_the_fmu_on_a_board(target: str) -> None:
+    tools.need(target)
+    model, fed = ahead(), beyond()
+    program = tools.program_of(tools.project_of_model(model, QUANTUM, target), target)
+    found = tools.answers(program, target, fed, 2)[2:, 2:]
+    expected = tools.model_answers(model, QUANTUM, fed)
+    assert np.array_equal(found, expected)
+    assert np.ptp(np.abs(expected[:, 1])) > 1.0, "the table is seen"
+    q = QUANTUM * np.round(fed[2:, 4] / QUANTUM)
+    waves = np.cos(np.pi * np.outer(np.arange(4), (np.clip(q, -0.02, 0.02) + 0.02) / 0.04))
+    told = LEVEL * np.exp(FRICTION.level_change @ waves) * np.tanh(fed[2:, 5] / 0.01)
+    np.testing.assert_allclose(expected[:, 1], told, rtol=1e-12, atol=1e-12)

@@ -11,7 +11,6 @@ from effect_examples import EXAMPLES, mount
 from export_models import controller, finish, lugre, oscillator, symbols, van_der_pol, variable
 from friction_laws import ONE_SIDED, VARIANTS
 from modelica_flat import Flat, at_random, in_modelica
-from scipy.integrate import solve_ivp
 
 from pyfmi_models.card import read_card
 from pyfmi_models.derivation import derivation_of
@@ -100,25 +99,6 @@ def test_a_modelica_compiler_finds_every_package_whole() -> None:
         structure = rumoca.Session().loads(text, model="Test.Plant", filename="Test.mo").structure()
         found = (structure.is_balanced, structure.is_matched, structure.n_algebraic_loops, structure.n_states)
         assert found == (True, True, 0, len(plant.model().states)), case
-
-
-def test_a_modelica_tool_finds_the_same_motion() -> None:
-    """Three reversals of the paper's mount, simulated by rumoca's BDF from the text and by Radau from the model."""
-    rumoca = pytest.importorskip("rumoca", reason="the Modelica compiler rumoca is not installed")
-    mount = read_card("paper_mount").plant()
-    model = mount.model()
-    text = modelica_text(model, "Test", derivation_of(mount))
-    text += f"model Run Test.Plant plant(tau = 6*sin({2 * math.pi!r}*time), disturbance = 0); end Run;"
-    settings = rumoca.SimConfig(rtol=1e-9, atol=1e-12, solver="bdf")
-    found = rumoca.Session().loads(text, model="Run", filename="Test.mo").simulate(t=(0, 1.5), dt=0.01, config=settings)
-    p = [one.start for one in model.parameters]
-
-    def rates(t: float, x: np.ndarray) -> np.ndarray:
-        return np.asarray(model.equations(t, x, [6 * math.sin(2 * math.pi * t), 0], p)[0]).ravel()
-
-    wanted = solve_ivp(rates, (0, 1.5), np.zeros(3), method="Radau", rtol=1e-9, atol=1e-13, t_eval=found.time)
-    for name, values in zip(("position", "speed", "friction.bristle"), wanted.y, strict=True):
-        assert np.abs(found[f"plant.{name}"] - values).max() < 1e-6 * np.abs(values).max()
 
 
 def test_what_modelica_cannot_say_is_refused(tmp_path: Path) -> None:

@@ -1,18 +1,29 @@
-"""Five platforms from one machine: right formats, old enough systems, and folders where importers look."""
+"""Five platforms from one machine: right formats, old enough systems, found by importers, the same bits on each."""
 
+import os
 import re
+import shutil
 import struct
+import subprocess
 import zipfile
+from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import export_models as models
 import pytest
 from commands import call
+from effect_examples import EXAMPLES, mount
 
+from pyfmi_models.card import read_card
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export import build_library, export_fmu
+from pyfmi_models.export.build import FLAGS, compile_shared, sources_of
+from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.platforms import PLATFORMS, host, platforms_of
 from pyfmi_models.export.universal import universal_binary
+from pyfmi_models.friction import LuGre
+from pyfmi_models.model import Pair
 
 content = cache(lambda platform: build_library(models.lugre(), platform).read_bytes())
 
@@ -97,39 +108,24 @@ def test_a_universal_file_holds_both_processors_untouched():
         universal_binary([content("x86_64-linux")])
 
 
-@pytest.fixture(scope="module")
-def everywhere(tmp_path_factory):
-    """Binaries in the archives for all platforms: version -> name -> content."""
-    found = {}
-    for fmi in (2, 3):
-        path = export_fmu(models.lugre(), tmp_path_factory.mktemp("all") / "a.fmu", fmi=fmi, platforms=tuple(PLATFORMS))
-        with zipfile.ZipFile(path) as archive:
-            names = [name for name in archive.namelist() if name.startswith("binaries/")]
-            found[fmi] = {name.removeprefix("binaries/"): archive.read(name) for name in names}
-    return found
-
-
-def test_fmi_3_has_a_folder_for_each_platform(everywhere):
-    assert everywhere[3] == {f"{name}/lugre{p.suffix}": content(name) for name, p in PLATFORMS.items()}
-
-
-def test_fmi_2_has_one_universal_folder_for_macos_and_keeps_linux64_for_x86(everywhere):
-    binaries = everywhere[2]
-    assert {name.split("/")[0] for name in binaries} == {"linux64", "aarch64-linux", "win64", "darwin64"}
-    assert binaries["linux64/lugre.so"] == content("x86_64-linux")
-    assert binaries["aarch64-linux/lugre.so"] == content("aarch64-linux")
-    assert binaries["win64/lugre.dll"] == content("x86_64-windows")
-    assert set(slices_of(binaries["darwin64/lugre.dylib"]).values()) == {
-        content("x86_64-darwin"),
-        content("aarch64-darwin"),
-    }
-
-
-def test_fmi_2_for_aarch64_linux_alone_lies_where_importers_there_look(tmp_path):
-    path = export_fmu(models.lugre(), tmp_path / "a.fmu", fmi=2, platforms=("aarch64-linux",))
+@pytest.mark.parametrize(
+    ("fmi", "platforms", "folders"),
+    [
+        (3, tuple(PLATFORMS), {name: name for name in PLATFORMS}),
+        (2, tuple(PLATFORMS), {"linux64": "x86_64-linux", "aarch64-linux": "aarch64-linux", "win64": "x86_64-windows"}),
+        (2, ("aarch64-linux",), {"linux64": "aarch64-linux", "aarch64-linux": "aarch64-linux"}),
+    ],
+    ids=["a folder each", "linux64 is x86, one folder for macOS", "where importers of an ARM look"],
+)
+def test_binaries_lie_where_importers_look(fmi, platforms, folders, tmp_path):
+    path = export_fmu(models.lugre(), tmp_path / "a.fmu", fmi=fmi, platforms=platforms)
     with zipfile.ZipFile(path) as archive:
-        for folder in ("linux64", "aarch64-linux"):
-            assert archive.read(f"binaries/{folder}/lugre.so") == content("aarch64-linux")
+        found = {name: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
+    if fmi == 2 and len(platforms) > 1:
+        thin = slices_of(found.pop("binaries/darwin64/lugre.dylib"))
+        assert set(thin.values()) == {content("x86_64-darwin"), content("aarch64-darwin")}
+    expected = {f"{folder}/lugre{PLATFORMS[name].suffix}": content(name) for folder, name in folders.items()}
+    assert found == {f"binaries/{name}": library for name, library in expected.items()}
 
 
 def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
@@ -147,3 +143,149 @@ def test_platforms_are_named_in_words_and_the_host_comes_first():
     assert platforms_of("x86_64-windows,aarch64-linux") == ("aarch64-linux", "x86_64-windows")
     with pytest.raises(ExportError, match='platform "vax" is unknown; there are: x86_64-linux, aarch64-linux'):
         platforms_of("host,vax")
+
+
+# The same bits everywhere.
+
+LAW = LuGre(sigma0=Pair(2e4, 3e4), sigma1=200.0, sigma2=3.0, Fc=Pair(1.0, 1.2), Fs=1.5, Vs=0.05, delta=1.9)
+
+
+def plant():
+    """An effect of every kind but presliding, which would replace the bristles of the law."""
+    kinds = {one.id: one for one in EXAMPLES if one.id != "presliding"}
+    return mount(*kinds.values(), friction=LAW).model()
+
+
+def controller():
+    return read_card("paper_mount").controller_model()
+
+
+@dataclass(frozen=True)
+class Machine:
+    target: str
+    flags: tuple[str, ...] = ("-static",)
+    runner: str = ""
+    options: tuple[str, ...] = ()
+    package: str = "qemu-user"
+
+
+HOST = Machine(PLATFORMS[host()].target, ())
+CONSOLE = ("-lkernel32", "-mconsole", "-Wl,-e,mainCRTStartup")
+MACHINES = {
+    "Cortex-A9": Machine("arm-linux-musleabihf", ("-static", "-mcpu=cortex_a9"), "qemu-arm", ("-cpu", "cortex-a9")),
+    "aarch64": Machine("aarch64-linux-musl", runner="qemu-aarch64"),
+    "Windows": Machine(
+        PLATFORMS["x86_64-windows"].target, (*PLATFORMS["x86_64-windows"].flags, *CONSOLE), "wine64", package="wine64"
+    ),
+}
+STEPS = {plant: 2_400, controller: 25_000}
+AMPLITUDES = {"tau": 9.0, "disturbance": 1.0, "temperature": 20.0, "q": 0.01, "q_d": 0.01, "v_d": 0.05, "a_d": 0.1}
+"""How far an input swings; others by their nominal value."""
+
+
+@cache
+def sources(make):
+    """The sources of an FMU and of the driver that hashes at least 100 000 states, rates and outputs of it."""
+    generated, steps = generate(make()), STEPS[make]
+    assert steps * len(generated.layout.of("state", "rate", "output")) >= 100_000
+    inputs = [row.variable for row in generated.layout.of("input")]
+    swings = ", ".join(str(AMPLITUDES.get(one.name, one.nominal)) for one in inputs)
+    values = {"SIZE": len(generated.layout.rows), "COUNT": steps, "LENGTH": 1e-4, "AMPLITUDES": swings}
+    scenario = "".join(f"#define {name} {value}\n" for name, value in values.items())
+    driver = (Path(__file__).parent / "exact_driver.c").read_bytes()
+    return sources_of(generated) | {"scenario.h": scenario.encode(), "driver.c": driver}
+
+
+def runner_of(machine):
+    """The program that runs the machine's code here, as the start of a command."""
+    if not machine.runner:
+        return []
+    found = shutil.which(machine.runner) or shutil.which(machine.runner, path="/usr/lib/wine")
+    if not found:
+        pytest.skip(f"{machine.runner} is not installed (apt-get install {machine.package})")
+    return [found, *machine.options]
+
+
+@pytest.fixture(scope="module")
+def wine(tmp_path_factory):
+    """Environment with a home of its own for Wine, which fills it with 700 MB."""
+    folder = tmp_path_factory.mktemp("wine")
+    environment = os.environ | {"WINEPREFIX": str(folder), "WINEDEBUG": "-all"}
+    yield environment
+    if (folder / "system.reg").exists():
+        server = shutil.which("wineserver", path=f"/usr/lib/wine:{os.defpath}")
+        subprocess.run([str(server), "-k"], env=environment, check=False)
+        subprocess.run([str(server), "-w"], env=environment, check=False)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def bits(make, machine, environment=None):
+    """Hash of the bits that the FMU answers in the scenario, run as the machine would run it."""
+    runner = runner_of(machine)
+    flags = tuple(flag for flag in FLAGS if flag not in ("-shared", "-fPIC"))
+    extra = {path.name: path.read_bytes() for path in PLATFORMS["x86_64-windows"].extra if machine.runner == "wine64"}
+    program = compile_shared(sources(make) | extra, "driver.exe", machine.target, (*flags, *machine.flags))
+    command = [*runner, str(program)]
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout.strip()
+
+
+native = cache(lambda make: bits(make, HOST))
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("make", STEPS)
+def test_every_machine_computes_the_same_bits(make, machine, wine):
+    assert re.fullmatch(r"[0-9a-f]{16}", native(make))
+    assert bits(make, MACHINES[machine], wine) == native(make)
+
+
+@pytest.mark.parametrize("make", STEPS)
+def test_another_compiler_computes_the_same_bits(make, tmp_path):
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("gcc is not installed")
+    for name, text in sources(make).items():
+        (tmp_path / name).write_bytes(text)
+    units = [name for name in sources(make) if name.endswith(".c") and name != "equations.c"]
+    flags = ("-std=c11", "-O3", "-ffp-contract=off")
+    subprocess.run([compiler, *flags, *units, "-o", "driver", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "driver"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == native(make)
+
+
+LOADERS = {
+    "x86_64-windows": b"""
+__declspec(dllimport) void *LoadLibraryA(const char *name);
+__declspec(dllimport) void *GetProcAddress(void *library, const char *name);
+__declspec(dllimport) void ExitProcess(unsigned code);
+void mainCRTStartup(void) {
+    void *library = LoadLibraryA("lugre.dll");
+    const char *(*version)(void) = library ? (const char *(*)(void))GetProcAddress(library, "fmi3GetVersion") : 0;
+    ExitProcess(version ? (unsigned)(version()[0] - '0') : 99);
+}
+""",
+    "aarch64-linux": b"""
+#include <dlfcn.h>
+int main(void) {
+    void *library = dlopen("./lugre.so", RTLD_NOW);
+    const char *(*version)(void) = library ? (const char *(*)(void))dlsym(library, "fmi3GetVersion") : 0;
+    return version ? version()[0] - '0' : 99;
+}
+""",
+}
+ARM_LIBC = Path("/usr/aarch64-linux-gnu")
+LOADING = {
+    "x86_64-windows": Machine("", ("-O2", "-nostdlib", *CONSOLE), "wine64", package="wine64"),
+    "aarch64-linux": Machine("", ("-O2", "-ldl"), "qemu-aarch64", ("-L", str(ARM_LIBC))),
+}
+
+
+@pytest.mark.parametrize("platform", LOADERS)
+def test_the_library_for_another_machine_loads_there(platform, wine):
+    machine, library = LOADING[platform], build_library(models.lugre(), platform)
+    runner = runner_of(machine)
+    if "-L" in runner and not ARM_LIBC.exists():
+        pytest.skip("there is no glibc for aarch64 (apt-get install libc6-arm64-cross)")
+    program = compile_shared({"l.c": LOADERS[platform]}, "l.exe", PLATFORMS[platform].target, machine.flags)
+    command = [*runner, str(program)]
+    assert subprocess.run(command, cwd=library.parent, env=wine, check=False).returncode == 3

@@ -12,6 +12,7 @@ from dataclasses import replace
 from importlib.resources import files
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,6 +44,16 @@ def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def inside(ssp: Path) -> dict[str, bytes]:
+    return files_in(ssp)
+
+
+def files_in(path: Path | io.BytesIO) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture(scope="module")
 def own(ssp: Path) -> np.ndarray:
     """The first STEPS steps of `cosim run`."""
     scenario = replace(read_scenario(ssp), ticks=STEPS + 1)
@@ -50,12 +61,11 @@ def own(ssp: Path) -> np.ndarray:
     return np.column_stack([recording[name] for name in SIGNALS])
 
 
-def test_the_structure_and_the_parameter_sets_are_valid_ssp_1_0(ssp: Path) -> None:
-    with zipfile.ZipFile(ssp) as archive:
-        schemas = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
-        checked = [name for name in archive.namelist() if Path(name).suffix in schemas]
-        for name in checked:
-            validate_tree(etree.fromstring(archive.read(name)), schemas[Path(name).suffix])
+def test_the_structure_and_the_parameter_sets_are_valid_ssp_1_0(inside: dict[str, bytes]) -> None:
+    schemas = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
+    checked = [name for name in inside if Path(name).suffix in schemas]
+    for name in checked:
+        validate_tree(etree.fromstring(inside[name]), schemas[Path(name).suffix])
     assert len(checked) == 4
 
 
@@ -63,13 +73,9 @@ def test_units_are_defined_by_base_units_as_they_are_known_here(tmp_path: Path) 
     """Of a card with a time in milliseconds among SI: powers and factor are those that `--units` reads by the name."""
     text = (files("pyfmi_models") / "cards" / "paper_mount.toml").read_text("utf-8")
     card = parse_card(text + '\n[[effects]]\neffect = "delay"\ndelay_ms = 2.0\n', "late.toml")
-    found: dict[str, dict[str, str]] = {}
-    with zipfile.ZipFile(export_ssp(system_of(card), tmp_path / "a.ssp")) as archive:
-        for name in archive.namelist():
-            if name.endswith((".ssd", ".ssv")):
-                found |= {
-                    one.get("name"): dict(one[0].attrib) for one in etree.fromstring(archive.read(name)).iter("{*}Unit")
-                }
+    made = files_in(export_ssp(system_of(card), tmp_path / "a.ssp"))
+    roots = [etree.fromstring(made[name]) for name in made if name.endswith((".ssd", ".ssv"))]
+    found = {one.get("name"): dict(one[0].attrib) for root in roots for one in root.iter("{*}Unit")}
     assert {"ms", "N.m", "rad/s2"} <= found.keys()
     for name, base in found.items():
         known = unit(name)
@@ -83,10 +89,9 @@ def test_the_metadata_say_what_a_model_was_identified_from_and_how_well(tmp_path
         "evidence": "held-out RMS 0.79 refitted, 0.10 with the effects",
     }
     card = replace(read_card("paper_mount"), origin=origin)
-    with zipfile.ZipFile(export_ssp(system_of(card), tmp_path / "a.ssp")) as archive:
-        root = etree.fromstring(archive.read("resources/mount.srmd"))
-        content = archive.read("resources/mount.fmu")
-        assert "resources/reference.srmd" not in archive.namelist()
+    made = files_in(export_ssp(system_of(card), tmp_path / "a.ssp"))
+    root, content = etree.fromstring(made["resources/mount.srmd"]), made["resources/mount.fmu"]
+    assert "resources/reference.srmd" not in made
     assert root.tag == f"{{{srmd.NAMESPACES['srmd']}}}SimulationResourceMetaData"
     assert (root.get("version"), root.get("data"), root.get("checksumType")) == ("1.0.0", "mount.fmu", "SHA3-256")
     assert root.get("checksum") == hashlib.sha3_256(content).hexdigest()
@@ -104,15 +109,13 @@ ROLES = (
 """FMI-LS-REF 1.0.0-beta.1, table of roles."""
 
 
-def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(ssp: Path) -> None:
+def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(inside: dict[str, bytes]) -> None:
     """As FMI-LS-REF has it: name and place of the manifest, its attributes, roles, and sources from there on."""
     space = "{http://fmi-standard.org/fmi-ls-manifest}"
-    with zipfile.ZipFile(ssp) as archive:
-        raw = {name: archive.read(f"resources/{name}.fmu") for name in ("mount", "reference")}
-    inner = {name: zipfile.ZipFile(io.BytesIO(content)) for name, content in raw.items()}
+    mount, reference = (files_in(io.BytesIO(inside[f"resources/{name}.fmu"])) for name in ("mount", "reference"))
     folder = "extra/org.fmi-standard.fmi-ls-ref"
-    assert not [name for name in inner["reference"].namelist() if name.startswith("extra")], "nobody identified it"
-    root = etree.fromstring(inner["mount"].read(f"{folder}/fmi-ls-manifest.xml"))
+    assert not [name for name in reference if name.startswith("extra")], "nobody identified it"
+    root = etree.fromstring(mount[f"{folder}/fmi-ls-manifest.xml"])
     assert (root.tag, root.get(f"{space}fmi-ls-name")) == ("fmiReferences", "org.fmi-standard.fmi-ls-ref")
     assert root.get(f"{space}fmi-ls-version") == "1.0.0-beta.1"
     assert root.get(f"{space}fmi-ls-description").startswith("Layered Standard providing information on related files")
@@ -124,17 +127,16 @@ def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(ssp: 
     }
     assert {one.tag for one in root} == {"Related"}
     assert all(re.fullmatch(ROLES, role) for role, _ in listed.values())
-    assert {posixpath.normpath(f"{folder}/{source}") for source in listed} <= set(inner["mount"].namelist())
-    assert inner["mount"].read(f"{folder}/card.ssv") == zipfile.ZipFile(ssp).read("resources/mount.ssv")
-    told = etree.fromstring(inner["mount"].read(f"{folder}/identification.srmd"))
+    assert {posixpath.normpath(f"{folder}/{source}") for source in listed} <= set(mount)
+    assert mount[f"{folder}/card.ssv"] == inside["resources/mount.ssv"]
+    told = etree.fromstring(mount[f"{folder}/identification.srmd"])
     assert told.get("checksum") is None, "an archive cannot state its own hash"
-    outside = etree.fromstring(zipfile.ZipFile(ssp).read("resources/mount.srmd"))
+    outside = etree.fromstring(inside["resources/mount.srmd"])
     assert [one.text for one in told.iter()] == [one.text for one in outside.iter()]
 
 
-def test_a_card_that_nothing_was_identified_from_says_so(ssp: Path) -> None:
-    with zipfile.ZipFile(ssp) as archive:
-        assert b"none: the numbers are those of the card" in archive.read("resources/controller.srmd")
+def test_a_card_that_nothing_was_identified_from_says_so(inside: dict[str, bytes]) -> None:
+    assert b"none: the numbers are those of the card" in inside["resources/controller.srmd"]
 
 
 def test_two_exports_have_the_same_bytes(ssp: Path, tmp_path: Path) -> None:
@@ -161,10 +163,8 @@ def test_parameter_sets_hold_the_numbers_of_the_card_with_units(ssp: Path) -> No
     }
 
 
-def test_the_delay_of_each_wire_is_written_down(ssp: Path) -> None:
-    with zipfile.ZipFile(ssp) as archive:
-        root = etree.fromstring(archive.read("SystemStructure.ssd"))
-        page = archive.read("documentation/index.html").decode()
+def test_the_delay_of_each_wire_is_written_down(inside: dict[str, bytes]) -> None:
+    root, page = etree.fromstring(inside["SystemStructure.ssd"]), inside["documentation/index.html"].decode()
     told = {one.get("startElement"): one.get("description") for one in root.iter("{*}Connection")}
     assert "acts from tick k + 1 on: a delay of one step" in told["controller"]
     assert "delay" not in told["reference"]
@@ -173,9 +173,7 @@ def test_the_delay_of_each_wire_is_written_down(ssp: Path) -> None:
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_other_tools_run_the_ssp_and_find_the_same_motion(
-    tool: str, ssp: Path, own: np.ndarray, tmp_path: Path
-) -> None:
+def test_other_tools_run_the_ssp_and_find_the_same_motion(tool: str, ssp: Path, own: Any, tmp_path: Path) -> None:
     try:
         importlib.import_module(TOOLS[tool])
     except (ImportError, OSError) as error:
@@ -202,9 +200,7 @@ def test_the_set_point_is_that_of_a_scenario() -> None:
     assert float(abrupt.equations(0, [], [], [one.start for one in abrupt.parameters])[1][0]) == 2e-3
 
 
-def test_a_card_without_controller_is_refused_in_one_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_card_without_controller_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) -> None:
     with pytest.raises(CardError, match=r"there is no \[controller\] section"):
         system_of(read_card("emps"))
     assert call("export", "emps", "--ssp", "--out", tmp_path) == 2

@@ -43,16 +43,8 @@ def lugre():
     states = (variable("angle", "rad"), variable("speed", "rad/s", nominal=0.01), variable("z", "rad", nominal=1e-5))
     outputs = (variable("reading", "rad"), variable("torque", "N.m"))
     inputs = (variable("drive", "N.m", low=-100, high=100),)
-    return finish(
-        "lugre",
-        [t, x, u, p],
-        [w, (u - friction) / inertia, rate],
-        [x[0], friction],
-        inputs=inputs,
-        parameters=parameters,
-        states=states,
-        outputs=outputs,
-    )
+    return finish("lugre", [t, x, u, p], [w, (u - friction) / inertia, rate], [x[0], friction], inputs=inputs,
+                  parameters=parameters, states=states, outputs=outputs)  # fmt: skip
 
 
 def van_der_pol():
@@ -109,13 +101,7 @@ LOGGER3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p,
 
 
 class Callbacks2(ctypes.Structure):
-    _fields_ = (
-        ("logger", LOGGER2),
-        ("allocate", ctypes.c_void_p),
-        ("free", ctypes.c_void_p),
-        ("finished", ctypes.c_void_p),
-        ("environment", ctypes.c_void_p),
-    )
+    _fields_ = (("logger", LOGGER2), *((name, ctypes.c_void_p) for name in ("allocate", "free", "finished", "where")))
 
 
 class Driver:
@@ -153,15 +139,19 @@ class Driver:
         converted = [ctypes.c_double(a) if isinstance(a, float) else a for a in arguments]
         return STATUS[function(ctypes.c_void_p(self.instance), *converted)]
 
-    def start(self, start=0.0, tolerance=None, stop=None, **values):
-        """Bring the instance through initialization, setting values before; return the instance."""
+    def initialize(self, start=0.0, tolerance=None, stop=None, **values):
+        """Set values and enter initialization mode, where everything may be set and asked."""
         arguments = (tolerance is not None, float(tolerance or 0), start, stop is not None, float(stop or 0))
         statuses = [self.call("SetupExperiment", *arguments)] if self.fmi == 2 else []
-        for name, value in values.items():
-            statuses.append(self.set(name, value))
+        statuses += [self.set(name, value) for name, value in values.items()]
         statuses.append(self.call("EnterInitializationMode", *(arguments if self.fmi == 3 else ())))
-        statuses.append(self.call("ExitInitializationMode"))
         assert set(statuses) == {"ok"}, (statuses, self.messages)
+        return self
+
+    def start(self, start=0.0, tolerance=None, stop=None, **values):
+        """Bring the instance through initialization, setting values before; return the instance."""
+        status = self.initialize(start, tolerance, stop, **values).call("ExitInitializationMode")
+        assert status == "ok", self.messages
         return self
 
     def set(self, name, value):
@@ -190,6 +180,29 @@ class Driver:
             status = self.step(start + i * length, length)
             assert status == "ok", self.messages
         return self
+
+    def update(self):
+        """Update the discrete states; return the time of the next event, or the status if it is not ok."""
+        if self.fmi == 2:
+            flags = ctypes.create_string_buffer(32)  # five integers, padding, then the time
+            status = self.call("NewDiscreteStates", ctypes.byref(flags))
+            time = ctypes.c_double.from_buffer(flags, 24)
+        else:
+            flags, time = [ctypes.byref(ctypes.c_bool()) for _ in range(5)], ctypes.c_double()
+            status = self.call("UpdateDiscreteStates", *flags, ctypes.byref(time))
+        return time.value if status == "ok" else status
+
+    def derivative(self, which, unknowns, knowns, seed, more=0):
+        """Directional: seed of the knowns -> change of the unknowns; adjoint: the other way; room for `more` results.
+
+        The status, and the results.
+        """
+        parts = [(ctypes.c_uint * len(part))(*(self.references[one] for one in part)) for part in (unknowns, knowns)]
+        result = (ctypes.c_double * (len(knowns if which == "Adjoint" else unknowns) + more))()
+        given, many = ((ctypes.c_size_t(len(one)),) if self.fmi == 3 else () for one in (seed, result))
+        sizes = [ctypes.c_size_t(len(part)) for part in parts]
+        arguments = parts[0], sizes[0], parts[1], sizes[1], (ctypes.c_double * len(seed))(*seed), *given, result, *many
+        return self.call(f"Get{which}Derivative", *arguments), np.array(result)
 
     def save(self):
         state = ctypes.c_void_p()
