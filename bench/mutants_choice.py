@@ -15,7 +15,7 @@ PRODUCT = ("cosim", "pyfmi_models", *sorted(path.parent.name for path in HOME.gl
 MOST, TOGETHER, MANY = 4, 8, 20
 """Imports between a test and a module at most; files of which tests that name what was changed are asked first and
 together, and how many."""
-SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
+SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_platforms")
 """Test files that are not asked, nor those of `NOT_ASKED`: what only they would notice counts as survived."""
 NOT_ASKED = ("house", "documents", "studies", "serve")
 DECLARING = {"pyfmi_models": "models/test_parameter_ranges.py", "cosim/hardware": "hardware/test_machine_ranges.py"}

@@ -270,14 +270,9 @@ def close(model: Model, reference: np.ndarray, resist: np.ndarray) -> dict[str, 
     return dict(zip(names, rows, strict=True)) | {"e": reference[:, 0] - rows[len(model.outputs)]}
 
 
-def seen_of(speed: np.ndarray) -> np.ndarray:
-    """What an estimate sees of a reference, a row a tick."""
-    return np.column_stack([0 * speed, speed, 0 * speed])
-
-
-def friction_of(law: LuGre, speed: np.ndarray, bias: float = 0.0) -> np.ndarray:
-    """Friction torque of a prescribed motion."""
-    return np.asarray(ticks(*compensation_case("C3a", law), seen_of(speed))[1] + bias)
+def compensated(law: LuGre, speed: np.ndarray, period: float = H) -> tuple[Array, Array]:
+    """Bristles and friction torque of a law on a prescribed motion."""
+    return ticks(*compensation_case("C3a", law), np.column_stack([0 * speed, speed, 0 * speed]), period)
 
 
 def test_the_observer_is_fed_the_command_that_acted_also_by_fmus_in_the_master(tmp_path: Path) -> None:
@@ -309,7 +304,7 @@ def test_compensation_integrates_the_bristles_with_the_speed_of_the_middle() -> 
 
     def bristles(period: float) -> np.ndarray:
         v = np.radians(5) * np.sin(4 * np.pi * period * np.arange(1, round(1 / period) + 1))
-        return np.asarray(ticks(*compensation_case("C3a", LUGRE), seen_of(v), period)[0][:, 0])
+        return compensated(LUGRE, v, period)[0][:, 0]
 
     fine = bristles(FINE / 20)[19::20]  # second order: 400 times better
     assert np.abs(bristles(FINE) - fine).max() < 5e-5 * LUGRE.Fs
@@ -343,12 +338,10 @@ def test_what_repeats_is_learned_from_pass_to_pass() -> None:
 
 @pytest.mark.parametrize(("level", "stiffness", "bias"), [(1.3, 0.8, 0.4), (0.7, 1.5, -0.6)])
 @pytest.mark.parametrize("start", [LUGRE, replace(LUGRE, Fc=Pair(2.322, 2.322))])
-def test_level_stiffness_and_bias_are_found_while_the_axis_moves(
-    level: float, stiffness: float, bias: float, start: LuGre
-) -> None:
+def test_level_stiffness_and_bias_are_found_in_motion(level: float, stiffness: float, bias: float, start: Any) -> None:
     true = replace(LUGRE, Fc=level * 2.322, Fs=level * 3.322, sigma0=stiffness * 9.23e4)
     reference = sine(40)
-    resist = friction_of(true, reference[:, 1], bias)
+    resist = compensated(true, reference[:, 1])[1] + bias
     found = close(controller(Adaptation(law=start)), reference, resist)
     assert found["adaptation.level"][-1] == pytest.approx(level, rel=0.02)
     assert found["adaptation.stiffness"][-1] == pytest.approx(stiffness, rel=0.05)

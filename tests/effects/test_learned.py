@@ -14,7 +14,7 @@ from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.errors import CardError
-from pyfmi_models.waves import broken_range, input_of, span, spoken, waves
+from pyfmi_models.waves import input_of, span, spoken, waves
 
 CARD = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
 
@@ -138,6 +138,15 @@ def torque(count: int, **more: Any) -> LearnedTorque:
         (torque(6, by="speed", by_seen=(1.0, 1.0), waves=(2, 1)), "by_seen must be two numbers"),
         (torque(1, by="command", by_seen=(0.0, 1.0), waves=(0, 0)), "what goes over the command is the drive's"),
         (torque(2, by_seen=(0.0, 1.0)), "belong to a table of products"),
+        (torque(1, seen=(0.0, 1.0, 2.0)), "seen must be two numbers"),
+        (torque(1, seen=(1.0, 1.0)), "seen must be two numbers"),
+        (torque(1, seen=(0.0, math.inf)), "seen must be two numbers"),
+        (torque(1, seen=(math.nan, 1.0)), "seen must be two numbers"),
+        (torque(1, over="turn", seen=(0.0, 1.0)), "seen is not for the turn"),
+        (torque(1, over="input.oil"), ""),
+        (torque(1, over="input.öl"), '"input.öl" is no quantity'),
+        (torque(1, over="input."), '"input." is no quantity'),
+        (torque(1, over="oil"), '"oil" is no quantity'),
         (LearnedDrive(command_seen=(-1.0, 1.0), missing=(0.0,) * 40), ""),
         (LearnedDrive(command_seen=(-1.0, 1.0), missing=(0.0,) * 41), "missing has 41 coefficients; it needs 1 to 40"),
         (LearnedHysteresis(strokes=(0.1,) * 12, torque=(1.0,) * 12), ""),
@@ -208,28 +217,6 @@ def test_a_quantity_is_an_input_where_it_is_none_of_the_axis() -> None:
     assert (oil.name, oil.unit, oil.start) == ("oil", "1", 2.5)
     (warm,) = input_of("temperature", (0.0, 40.0))
     assert (warm.unit, warm.start) == ("degC", 20.0), "the card holds at 20 degC, whatever was seen"
-
-
-@pytest.mark.parametrize(
-    ("name", "seen", "good"),
-    [
-        ("speed", (0.0, 1.0), True),
-        ("speed", (1.0, 1.0), False),
-        ("speed", (0.0, 1.0, 2.0), False),
-        ("speed", (0.0, math.inf), False),
-        ("speed", (math.nan, 1.0), False),
-        ("turn", (), True),
-        ("turn", (0.0, 1.0), False),
-        ("input.oil", (0.0, 1.0), True),
-        ("input.öl", (0.0, 1.0), False),
-        ("input.", (0.0, 1.0), False),
-        ("oil", (0.0, 1.0), False),
-    ],
-)
-def test_a_range_is_two_numbers_the_lower_one_first_of_a_quantity_that_there_is(
-    name: str, seen: tuple[float, ...], good: bool
-) -> None:
-    assert (broken_range(name, "seen", seen) == "") == good
 
 
 def test_a_range_is_said_in_its_unit() -> None:

@@ -14,13 +14,12 @@ from fuzz_rules import sealed
 from pyfmi_models.export.build import compile_shared, sources_of
 from pyfmi_models.export.platforms import PLATFORMS, host
 
-both = pytest.mark.parametrize("fmi", [2, 3])
+pytestmark = pytest.mark.parametrize("fmi", [2, 3])
 
 
 # Memory
 
 
-@both
 @pytest.mark.parametrize("make", [models.lugre, models.controller, models.oscillator])
 def test_a_saved_state_is_that_of_its_point_and_a_restored_run_repeats_its_bits(make, fmi):
     driver = instance(make, fmi)
@@ -39,7 +38,6 @@ def test_a_saved_state_is_that_of_its_point_and_a_restored_run_repeats_its_bits(
     assert state.value is None
 
 
-@both
 def test_a_damaged_or_foreign_state_is_refused_and_leaves_the_one_in_whose_place_it_was_to_go(fmi):
     driver = instance(models.lugre, fmi, drive=4.0).run(0, 10, 1e-3)
     state = driver.save()
@@ -61,7 +59,6 @@ def test_a_damaged_or_foreign_state_is_refused_and_leaves_the_one_in_whose_place
     assert driver.serialize(state) == content
 
 
-@both
 def test_reset_returns_to_the_start(fmi):
     driver = instance(models.lugre, fmi)
     fresh = everything(driver)
@@ -74,7 +71,6 @@ def test_reset_returns_to_the_start(fmi):
 # Ticks
 
 
-@both
 def test_the_tick_at_the_start_of_a_step_belongs_to_it_that_at_its_end_does_not(fmi):
     driver = instance(models.controller, fmi)
     counts = []
@@ -84,7 +80,6 @@ def test_the_tick_at_the_start_of_a_step_belongs_to_it_that_at_its_end_does_not(
     assert counts == [1, 1, 2, 3, 6]
 
 
-@both
 def test_outputs_hold_their_start_value_until_the_first_tick(fmi):
     driver = instance(models.controller, fmi, wanted=1.0)
     assert driver.get("command") == 0.25
@@ -93,7 +88,6 @@ def test_outputs_hold_their_start_value_until_the_first_tick(fmi):
     assert instance(models.controller, fmi, command=7.0).get("command") == 7.0
 
 
-@both
 def test_in_event_mode_a_due_tick_shows_its_outputs_before_the_memory_moves(fmi):
     driver = instance(models.controller, fmi, "ME")
     for wanted in (1.0, 2.0):
@@ -104,7 +98,6 @@ def test_in_event_mode_a_due_tick_shows_its_outputs_before_the_memory_moves(fmi)
     assert list(driver.get("count", "last")) == [1, 2.0]
 
 
-@both
 def test_the_next_event_is_a_multiple_of_the_period_and_due_though_a_master_rounds_it_down(fmi):
     driver = instance(models.controller, fmi, "ME", start=5.0)
     assert [driver.update(), driver.update()] == [5.0 + 1e-3, 5.0 + 1e-3]
@@ -117,7 +110,6 @@ def test_the_next_event_is_a_multiple_of_the_period_and_due_though_a_master_roun
         assert driver.get("count") == count, "the ticks at 0, 1, 2 and 3 ms"
 
 
-@both
 @pytest.mark.parametrize("kind", ["CS", "ME"])
 def test_a_tick_that_fails_takes_those_before_it_back(fmi, kind):
     """Root of 4 - count: five ticks have one, the sixth has none."""
@@ -158,7 +150,6 @@ WRONG = {
 }
 
 
-@both
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_call_is_refused_with_a_sentence_and_changes_nothing(what, fmi):
     driver = instance(models.lugre, fmi, stop=1.0, drive=3.0).run(0, 10, 1e-3)
@@ -171,21 +162,18 @@ def test_a_wrong_call_is_refused_with_a_sentence_and_changes_nothing(what, fmi):
     assert driver.step(0.01, 1e-3) == "ok"
 
 
-@both
 def test_calls_without_an_instance_are_errors_not_crashes(fmi):
     driver = instance(models.lugre, fmi)
     driver.instance = None
     assert {driver.step(0, 1.0), driver.set("drive", 1.0), driver.get("angle"), driver.call("Terminate")} == {"error"}
 
 
-@both
 def test_the_binary_of_another_description_is_refused(fmi):
     driver = models.Driver(models.lugre(), library(models.lugre), fmi, token="{0}")
     assert driver.instance is None
     assert "do not belong together" in driver.messages[-1][2]
 
 
-@both
 def test_equations_that_leave_their_domain_stop_a_run_and_let_model_exchange_try_a_smaller_step(fmi):
     driver = instance(models.undefined_below_zero, fmi, sink=1.0)
     assert driver.step(0, 2.0) == "ok"
@@ -199,7 +187,6 @@ def test_equations_that_leave_their_domain_stop_a_run_and_let_model_exchange_try
         assert driver.get("flow") == flow
 
 
-@both
 def test_parameters_can_be_tuned_between_steps_and_inputs_may_be_beyond_their_bounds(fmi):
     driver = instance(models.oscillator, fmi)
     assert driver.set("stiffness", 4.0) == "ok"
@@ -209,7 +196,6 @@ def test_parameters_can_be_tuned_between_steps_and_inputs_may_be_beyond_their_bo
     assert driver.get("drive") == 1000.0
 
 
-@both
 def test_a_tighter_tolerance_gives_a_smaller_error(fmi):
     def end(tolerance):
         return instance(models.lugre, fmi, tolerance=tolerance, drive=5.0).run(0, 10, 0.05).get("angle", "speed")
@@ -220,7 +206,6 @@ def test_a_tighter_tolerance_gives_a_smaller_error(fmi):
     assert errors[2] < 1e-6
 
 
-@both
 def test_log_categories_can_be_chosen_and_changes_of_mode_are_told_from_the_start(fmi):
     driver = instance(models.lugre, fmi)
     on = True if fmi == 3 else 1
@@ -279,7 +264,6 @@ def attempts(driver):
     }
 
 
-@both
 @pytest.mark.parametrize("mode", MODES)
 def test_a_call_is_allowed_in_the_modes_of_the_standard(mode, fmi):
     answers = {}
@@ -292,23 +276,6 @@ def test_a_call_is_allowed_in_the_modes_of_the_standard(mode, fmi):
     assert allowed - ({"event"} if mode == "event" else set()) == MODES[mode]
 
 
-@pytest.mark.parametrize(
-    ("kind", "arguments", "said"),
-    [
-        ("CoSimulation", (True, False, None, ctypes.c_size_t(0), None), "event mode is not available in co-simulation"),
-        ("ScheduledExecution", (None,), "the model has no scheduled execution"),
-    ],
-)
-def test_what_a_model_does_not_offer_is_refused_with_a_sentence(kind, arguments, said):
-    heard, logger = [], models.LOGGER3(lambda e, status, category, message: heard.append(message.decode()))
-    create = getattr(ctypes.CDLL(str(library(models.lugre))), f"fmi3Instantiate{kind}")
-    create.restype = ctypes.c_void_p
-    token = models.generate(models.lugre()).token.encode()
-    assert create(b"it", token, None, False, False, *arguments, logger, None, None, None) is None
-    assert heard == [said]
-
-
-@both
 @pytest.mark.parametrize("name", fuzz_models.MODELS)
 def test_no_random_call_crashes_and_every_answer_keeps_the_rules(name, fmi, tmp_path):
     """A sample of what bench/fuzz.py does for long and under sanitizers."""

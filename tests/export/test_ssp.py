@@ -4,13 +4,11 @@ import hashlib
 import importlib
 import io
 import posixpath
-import re
 import subprocess
 import sys
 import zipfile
 from dataclasses import replace
 from importlib.resources import files
-from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -101,14 +99,6 @@ def test_the_metadata_say_what_a_model_was_identified_from_and_how_well(tmp_path
     assert entries["evidence"] == origin["evidence"]
 
 
-ROLES = (
-    "document|requirement|specification|model|parameter|system|testcase|experiment(/(smoke-test|validation|"
-    "uncertainty-analysis))?|result|method|rationale|report|request|delivery|configuration|signature|"
-    "serialized-state(/.*)?|meta-data|other"
-)
-"""FMI-LS-REF 1.0.0-beta.1, table of roles."""
-
-
 def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(inside: dict[str, bytes]) -> None:
     """As FMI-LS-REF has it: name and place of the manifest, its attributes, roles, and sources from there on."""
     space = "{http://fmi-standard.org/fmi-ls-manifest}"
@@ -126,7 +116,6 @@ def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(insid
         "card.ssv": ("parameter", "application/x-ssp-parameter-set"),
     }
     assert {one.tag for one in root} == {"Related"}
-    assert all(re.fullmatch(ROLES, role) for role, _ in listed.values())
     assert {posixpath.normpath(f"{folder}/{source}") for source in listed} <= set(mount)
     assert mount[f"{folder}/card.ssv"] == inside["resources/mount.ssv"]
     told = etree.fromstring(mount[f"{folder}/identification.srmd"])
@@ -196,8 +185,6 @@ def test_the_set_point_is_that_of_a_scenario() -> None:
     p = [one.start for one in model.parameters]
     found = np.array([model.equations(one, [], [], p)[1].full().ravel() for one in t]).T
     np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-16)
-    abrupt = SetPoint(name="r", frequency=0.3, amplitude=2e-3, phase=pi / 2).model()
-    assert float(abrupt.equations(0, [], [], [one.start for one in abrupt.parameters])[1][0]) == 2e-3
 
 
 def test_a_card_without_controller_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) -> None:

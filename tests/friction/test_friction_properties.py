@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cosim.api.show import describe
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.friction import LAWS, FrictionLaw, LuGre, MaxwellSlip, Stribeck
+from pyfmi_models.friction import LAWS, FrictionLaw, Stribeck
 from pyfmi_models.friction.lugre_passive import FASTEST, PassiveLuGre
 
 
@@ -114,9 +114,7 @@ def test_advance_starts_with_the_rate(law: FrictionLaw, share: float, v: float) 
 @laws(WITH_MEMORY)
 @given(share=shares, v=moving, first=st.floats(0, 3), second=st.floats(0, 3))
 @settings(max_examples=40, deadline=None)
-def test_two_short_advances_are_one_long_one(
-    law: FrictionLaw, share: float, v: float, first: float, second: float
-) -> None:
+def test_two_short_advances_are_one_long_one(law: Any, share: float, v: float, first: float, second: float) -> None:
     this, unit = numeric(law), 1e-5 / abs(v)  # up to 60 urad, twice what the contact bends
     half = this("advance", this.start(share), v, first * unit)
     whole = this("advance", this.start(share), v, (first + second) * unit)
@@ -131,14 +129,6 @@ def test_the_contact_never_carries_more_than_break_away(law: FrictionLaw, motion
     most = this("level", this.start(), 0.0)[0]
     states = this.along(np.array(motion), 1e-3)
     assert np.abs(states).max() <= most / this.size * (1 + 1e-12)
-
-
-@laws(WITH_MEMORY)
-def test_small_displacements_meet_a_spring_of_stiffness_sigma0(law: FrictionLaw) -> None:
-    distance = 1e-10  # 3e-6 of the break-away displacement
-    assert numeric(law)("advance", numeric(law).start(), distance, 1.0).sum() == pytest.approx(
-        law.sigma0 * distance, rel=2e-5
-    )
 
 
 @laws(ALL)
@@ -173,9 +163,6 @@ def test_values_and_derivatives_are_finite_at_rest_and_at_any_speed(law: Frictio
 # Passivity: no motion takes more energy out of a contact than it put in; with LuGre's shipped numbers one does.
 
 LUGRE, SLIP, FADING = EXAMPLES["lugre"], EXAMPLES["maxwell_slip"], EXAMPLES["lugre_passive"]
-assert isinstance(LUGRE, LuGre)
-assert isinstance(SLIP, MaxwellSlip)
-assert isinstance(FADING, PassiveLuGre)
 STATIC = Stribeck(Fc=2.322, Fs=3.322, Vs=0.04129, delta=1.292, sigma2=32.77)
 BEND = 2.322 / 9.23e4
 """Level over stiffness [rad]."""
@@ -231,9 +218,7 @@ def test_dashes_between_creeps_take_energy_out_of_a_law_that_is_not_passive(law:
 @pytest.mark.parametrize("law", PASSIVE.values(), ids=PASSIVE.keys())
 @given(motion=st.lists(st.tuples(st.floats(-9, 1.5), st.floats(-2, 1), st.booleans()), min_size=1, max_size=30))
 @settings(max_examples=60, deadline=None)
-def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
-    law: FrictionLaw, motion: list[tuple[float, float, bool]]
-) -> None:
+def test_from_a_relaxed_contact_no_motion_ever_gains_energy(law: FrictionLaw, motion: list[Any]) -> None:
     """Passivity in the strict sense, damping included: any speeds, each over a distance near that of presliding."""
     speeds = np.array([10**size * (1 if forward else -1) for size, _, forward in motion])
     seconds = np.array([10**share * BEND for _, share, _ in motion]) / np.abs(speeds)
@@ -244,9 +229,7 @@ def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
 
 @given(share=st.floats(-1, 1), size=st.floats(-9, 3), stretch=st.floats(-2, 1))
 @settings(max_examples=300, deadline=None)
-def test_fading_damping_wastes_power_in_every_state_at_every_speed_and_level(
-    share: float, size: float, stretch: float
-) -> None:
+def test_fading_damping_wastes_power_in_every_state_at_any_speed(share: float, size: float, stretch: float) -> None:
     """Point by point: power in, less what the bristles store, whatever effects make of the level."""
     v, level = 10**size, LUGRE.Fs * 10**stretch
     law = replace(FADING, sigma2=0.0)
@@ -265,11 +248,7 @@ def test_a_card_with_a_law_that_is_not_passive_says_so() -> None:
     passive = read_card("paper_mount")
     assert replace(passive, friction=FADING).remarks() == ()
     assert "note 1" not in describe("emps")[0]
-
-
-def test_a_card_takes_fading_damping_and_its_speed() -> None:
-    numbers = "sigma0 = 1e5\nsigma1 = 500.0\nFc = 2.0\n"
-    head = '[mount]\ninertia = 30.0\n[friction]\nmodel = "lugre_passive"\n'
-    assert parse_card(head + numbers, "c.toml").friction == PassiveLuGre(sigma0=1e5, sigma1=500.0, Fc=2.0)
-    late = parse_card(head + numbers + "Vd = 0.1\n", "c.toml")
+    numbers = "sigma0 = 1e5\nsigma1 = 500.0\nFc = 2.0\nVd = 0.1\n"
+    late = parse_card(f'[mount]\ninertia = 30.0\n[friction]\nmodel = "lugre_passive"\n{numbers}', "c.toml")
+    assert late.friction == PassiveLuGre(sigma0=1e5, sigma1=500.0, Fc=2.0, Vd=0.1)
     assert "Vd = 0.1: only up to 4 sqrt(2 e) Fc / sigma1 = 0.0373 rad/s" in late.remarks()[0]

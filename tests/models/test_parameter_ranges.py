@@ -112,9 +112,7 @@ def test_the_table_names_only_forms_that_there_are() -> None:
         ("GearFriction", {"driving": 0.2, "driven": 0.2}, "driving"),
     ],
 )
-def test_of_two_directions_the_larger_number_says_how_large_an_effect_is(
-    name: str, changes: dict[str, float], number: str
-) -> None:
+def test_of_two_directions_the_larger_number_is_told(name: str, changes: dict[str, float], number: str) -> None:
     effect = replace(example(FORM[name]), **changes)
     assert effect.leading().parameter == number
 
