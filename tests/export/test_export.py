@@ -228,7 +228,7 @@ def rows_in(tool, path, folder):
         importlib.import_module(TOOLS[tool][0])
     except (ImportError, OSError) as error:
         pytest.skip(f"{tool} is not installed: {error}")
-    runner, out = Path(__file__).parents[1] / "tools" / "fmu_tools.py", folder / f"{tool}.npz"
+    runner, out = Path(__file__).parents[2] / "bench" / "fmu_tools.py", folder / f"{tool}.npz"
     command = [sys.executable, str(runner), tool, str(path), "100", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
