@@ -12,6 +12,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import parse_card
+from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 
@@ -33,3 +34,10 @@ def compared(problem: Problem, evaluations: int = 25) -> tuple[Comparison, Fit]:
 def diagnosed(runs: Sequence[Recording], card: str) -> Outcome:
     """The diagnosis of a card's text; the last recording is held out."""
     return diagnose(runs[:-1], runs[-1:], parse_card(card, "card.toml"))
+
+
+def likeliest(comparison: Comparison, base: Fit, effect: str) -> Effect:
+    """Where a fit of an effect starts: the candidate that has most evidence."""
+    looked = (one for one in comparison.screen(base) if one.candidate.effect == effect)
+    best = max(looked, key=lambda one: one.evidence)
+    return best.candidate.start(best.coefficients)

@@ -1,8 +1,7 @@
 """What lies between the drive and the reading: delays, lags, clocks and springs.
 
-Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does.
-
-Between a late torque and a late reading the reading's own lag behind the set point decides.
+Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does; between
+a late torque and a late reading the reading's own lag behind the set point.
 """
 
 from dataclasses import replace
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from effect_examples import linear, mount
-from problems import compared, problem_of
+from problems import compared, likeliest, problem_of
 from wandering import axis, swing
 from wandering import recorded as read
 
@@ -248,6 +247,14 @@ def test_a_fit_finds_the_resonance_of_the_right_form(hertz: float, side: str, ot
     assert getattr(found, "encoder_share", 0.5) == 0.5, "left as it was"
     assert left < 0.05
     assert energy(given, base, *FORMS[other])[0] > 4 * left
+
+
+@pytest.mark.parametrize("hertz", [32.0, 120.0])
+def test_the_likeliest_spring_starts_where_a_fit_ends_at_the_resonance(hertz: float) -> None:
+    given, base = problem(hertz, "load")
+    start = likeliest(compared(given)[0], base, "compliance")
+    assert isinstance(start, LoadSideCompliance)
+    assert energy(given, base, start)[1].resonance_hz == pytest.approx(hertz, rel=0.05)
 
 
 def test_a_spring_that_only_the_reversals_of_friction_show_is_none() -> None:

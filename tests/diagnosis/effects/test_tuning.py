@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loop import recorded as closed
-from problems import compared, diagnosed, problem_of
+from problems import compared, diagnosed, likeliest, problem_of
 from wandering import axis, recorded, swing
 
 from cosim.data.recording import Recording
@@ -248,9 +248,7 @@ def played(play: Backlash, seed: int) -> Recording:
 def test_from_the_likeliest_place_of_the_grid_a_fit_ends_at_the_truth(gap: float, friction: float) -> None:
     play = Backlash(gap_rad=gap, load_share=0.4, load_friction=friction)
     comparison, base = compared(_problem([played(play, seed) for seed in (1, 2)], CARD), 40)
-    looked = [one for one in comparison.screen(base) if one.candidate.effect == "backlash"]
-    best = max(looked, key=lambda one: one.evidence)
-    found = refitted(comparison, base, best.candidate.start(best.coefficients), 1)
+    found = refitted(comparison, base, likeliest(comparison, base, "backlash"), 1)
     assert isinstance(found.effect, Backlash)
     assert found.effect.gap_rad == pytest.approx(gap, rel=0.01)
     assert found.effect.load_share == pytest.approx(play.load_share, rel=0.05)
