@@ -10,7 +10,6 @@ from bench.net.answers import ALIKE, STORED, Answer, differences, of_folder, rea
 from bench.net.cases import NetCase, home
 from bench.net.counts import counted
 
-ROOT = Path(__file__).parents[2]
 SMALL = [one for one in home() if one.small and one.name != "home_none_1_none"]
 """Of three machines without anything two: the third is asked by `python -m bench.net check --small`."""
 MORE = 1.1

@@ -39,8 +39,7 @@ def left(residual: Array) -> Any:
     return SimpleNamespace(residual=residual)
 
 
-RIGHT = left(np.zeros(4 * RATE))
-"""A structure that leaves nothing in training."""
+RIGHT = left(np.zeros(4 * RATE))  # leaves nothing in training
 
 
 def elsewhere(v: Array, moved: Array | None = None, **other: Array) -> Any:
@@ -222,6 +221,13 @@ def test_noise_and_sizes_that_are_renewed_explain_the_data_better_and_come_near_
     assert found(drawn, floor=5.0).noise == pytest.approx([5.0, 5.0])
 
 
+@pytest.fixture(params=["compiled", "interpreted"])
+def _way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if request.param == "interpreted":
+        monkeypatch.setattr("cosim.diagnosis.evidence.marginal.library", lambda: None)
+
+
+@pytest.mark.usefixtures("_way")
 def test_renewed_noise_is_the_mean_square_left_with_the_uncertainty_of_the_fit() -> None:
     drawn = bands(START.noise, 40, 70)
     begun, renewed = (found(drawn, start=START, rounds=rounds) for rounds in (0, 1))
@@ -260,19 +266,15 @@ def dense(
     return -(effective @ np.log(noise) + energy + sizes) / 2 - penalty, noise, beta
 
 
-@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.usefixtures("_way")
 @pytest.mark.parametrize("relative", [1.0, 0.01, 1e-4, 1e-9])
-def test_a_marginal_likelihood_without_rounds_is_the_gaussian_integral(
-    compiled: bool, relative: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_marginal_likelihood_without_rounds_is_the_gaussian_integral(relative: float) -> None:
     """From sizes that are given too, down to a millionth of the prior, where a size counts as that."""
     rng = np.random.default_rng(1)
     bands = [rng.normal(0, 1, (50, 5)) for _ in range(2)]
     grams = np.array([one.T @ one for one in bands])
     count, effective, floor = np.array([50.0, 50.0]), np.array([50.0, 11.0]), np.array([1e-9, 2.0])
     free, group = np.array([3.0, 0.5, 1.0, 1.0]), Group(np.array([2, 3]), 0.7)
-    if not compiled:
-        monkeypatch.setattr("cosim.diagnosis.evidence.marginal.library", lambda: None)
     expected, noise, beta = dense(grams, free.copy(), group, size := relative * 0.7, count, effective, floor)
     start = None if relative == 1.0 else Marginal(0.0, noise, np.array([size]), beta)
     found = marginal(grams, free.copy(), [group], count, effective, floor, start, rounds=0)

@@ -158,8 +158,7 @@ def test_noise_is_measured_at_each_speed_and_not_by_what_is_there_for_a_while() 
 
 # A floor that trembles all the time is told with its level and band; what goes with the motion is not.
 
-BANDS = (2.0, 8.0, 32.0)
-T = np.arange(0, 40, 0.002)
+T, BANDS = np.arange(0, 40, 0.002), (2.0, 8.0, 32.0)
 TAU = 1 + 0.01 * np.sin(T)
 
 
