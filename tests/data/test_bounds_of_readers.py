@@ -35,10 +35,10 @@ def allowing(numbers: float, raised: int = 1) -> Allowance:
     return Allowance(1000, raised, numbers * limits.NUMBER, 60.0)
 
 
-def hdf5_of(path: Path) -> None:
+def hdf5_of(path: Path, table: dict[str, np.ndarray] = TABLE, **packed: object) -> None:
     with h5py.File(path, "w") as file:
-        for name, values in TABLE.items():
-            file[name] = values
+        for name, values in table.items():
+            file.create_dataset(name, data=values, **packed)
 
 
 def short() -> pa.Table:
@@ -55,11 +55,7 @@ WRITERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], int
     "h5": (hdf5_of, hdf5.read, 0),
     "mat": (lambda path: savemat(path, TABLE), matlab.read, 0),
     "npz": (lambda path: np.savez(path, **TABLE), numpy_files.read, COLUMNS * 128 // limits.NUMBER),
-    "csv": (
-        lambda path: path.write_text("t,tau,q\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows())),
-        read_text,
-        0,
-    ),
+    "csv": (lambda path: path.write_text("t,tau,q\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows())), read_text, 0),
 }
 """How a table is written in each format, its reader, and numbers that the headers of its parts are as long as."""
 
@@ -81,14 +77,8 @@ LARGE = 400_000
 """Numbers of a column that packs to next to nothing."""
 
 
-def packed_hdf5(path: Path) -> None:
-    with h5py.File(path, "w") as file:
-        for name in TABLE:
-            file.create_dataset(name, data=np.zeros(LARGE), compression="gzip", chunks=(1000,))
-
-
 PACKED: dict[str, Callable[[Path], object]] = {
-    "h5": packed_hdf5,
+    "h5": lambda path: hdf5_of(path, dict.fromkeys(TABLE, np.zeros(LARGE)), compression="gzip", chunks=(1000,)),
     "mat": lambda path: savemat(path, dict.fromkeys(TABLE, np.zeros(LARGE)), do_compression=True),
     "npz": lambda path: np.savez_compressed(path, **dict.fromkeys(TABLE, np.zeros(LARGE))),
 }
@@ -105,15 +95,6 @@ def test_too_many_numbers_are_refused_before_they_take_memory(format_: str, tmp_
         assert tracemalloc.get_traced_memory()[1] < LARGE * limits.NUMBER, "not even one column"
     finally:
         tracemalloc.stop()
-
-
-def test_records_of_json_are_counted_as_a_table(tmp_path: Path) -> None:
-    path = tmp_path / "run.json"
-    path.write_text(json.dumps([dict(zip(TABLE, row, strict=True)) for row in rows()]))
-    with within(allowing(1e6)):
-        assert len(json_records.read(path).values["q"]) == ROWS
-    with within(allowing(ROWS * COLUMNS - 1)), pytest.raises(RecordingError, match="limit="):
-        json_records.read(path)
 
 
 @pytest.mark.parametrize(
@@ -181,9 +162,8 @@ def test_vectors_and_tables_of_a_package_count_together(rows: int, fits: bool) -
 
 @pytest.mark.parametrize(("depth", "fits"), [(hdf5.DEEPEST, True), (hdf5.DEEPEST + 1, False)])
 def test_groups_of_hdf5_lie_a_hundred_deep_and_no_deeper(depth: int, fits: bool, tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        for name, values in TABLE.items():
-            file[name] = values
+    hdf5_of(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "a") as file:
         file.create_group("/".join(["g"] * depth))
     if fits:
         assert set(hdf5.read(tmp_path / "run.h5").values) == set(TABLE)
@@ -195,7 +175,7 @@ def test_groups_of_hdf5_lie_a_hundred_deep_and_no_deeper(depth: int, fits: bool,
 # What reading a file may cost is one rule for all readers, and `--layout limit=...` raises it.
 
 
-def test_too_many_numbers_are_refused_and_the_named_factor_lets_them_in(
+def test_too_many_numbers_are_refused_the_named_factor_lets_them_in_and_time_is_limited_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, "UNPACKED", 250 * limits.NUMBER)
@@ -203,22 +183,26 @@ def test_too_many_numbers_are_refused_and_the_named_factor_lets_them_in(
     with pytest.raises(RecordingError, match=r"at most 250 numbers are read.* --layout limit=2\."):
         Recording.read(tmp_path / "run.parquet")
     assert len(Recording.read(tmp_path / "run.parquet", layout={"limit": "2"})) == ROWS
-
-
-def test_time_is_limited_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(limits, "SECONDS", 0.0)
     (tmp_path / "run.csv.gz").write_bytes(gzip.compress(b"t,tau,q\n" + b"0.001,1,2\n" * 1000))
     with pytest.raises(RecordingError, match=r"took more than 0 s of a processor .* --layout limit=3\."):
         Recording.read(tmp_path / "run.csv.gz")
 
 
-def test_a_limit_leaves_an_importer_its_file(tmp_path: Path) -> None:
+def test_a_limit_leaves_an_importer_its_file_and_counts_records_of_json_as_a_table(tmp_path: Path) -> None:
     """Options on how a text is written switch the importers off; a limit says nothing of that."""
     lines = "".join(f"pos {q:+.6f} tau {tau:+.6f}\n" for _, tau, q in rows())
     (tmp_path / "run.log").write_text(f"Sampling period is 1000000 ns\n\n{lines}")
     options = options_of(tmp_path / "run.log", None, None, ["limit=2"])
     read = Recording.read(tmp_path / "run.log", {"q": "pos"}, layout=options["layout"])
     assert read.sample_time == pytest.approx(1e-3)
+    path = tmp_path / "run.json"
+    path.write_text(json.dumps([dict(zip(TABLE, row, strict=True)) for row in rows()]))
+    with within(allowing(1e6)):
+        assert len(json_records.read(path).values["q"]) == ROWS
+    with within(allowing(ROWS * COLUMNS - 1)), pytest.raises(RecordingError, match="limit="):
+        json_records.read(path)
 
 
 # A file that was made to cost memory or time is read or refused within 20 s of a processor and 1 GB.

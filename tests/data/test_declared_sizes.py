@@ -1,8 +1,10 @@
-"""What a file declares is judged before it is unpacked, and what is computed in a database is never run."""
+"""What a file declares is judged before it is unpacked; a reader that fails on one costs a sentence, and no more."""
 
 import gzip
 import re
+import sys
 import tracemalloc
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
@@ -17,9 +19,10 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data import limits
-from cosim.data.binary import hdf5, hdf5_chunks
+from cosim.data.binary import apart, hdf5, hdf5_chunks
 from cosim.data.recording import Recording
-from cosim.support.errors import RecordingError
+from cosim.support.cell import Cell
+from cosim.support.errors import MissingPackageError, RecordingError
 
 T = np.arange(400) * 1e-2
 AXIS = {"t": T, "tau": np.cos(T), "q": np.sin(T)}
@@ -52,21 +55,9 @@ def test_a_crafted_file_is_refused_for_what_it_declares(name: str, tmp_path: Pat
     assert re.search(SAYS[name], said), said
 
 
-def test_one_long_text_in_every_row_counts_as_often_as_it_stands_there(tmp_path: Path) -> None:
-    parquet.write_table(pa.table(AXIS | {"s": ["x" * 600_000] * 400}), tmp_path / "run.parquet")
-    with pytest.raises(RecordingError, match=rf"column s {LARGE}.*--layout limit=2"):
-        Recording.read(tmp_path / "run.parquet")
-
-
-def test_texts_that_stand_once_in_the_file_stand_once_in_memory(tmp_path: Path) -> None:
-    text = "x" * 400_000
-    parquet.write_table(pa.table(AXIS | {"s": [text, None] * 200}), tmp_path / "run.parquet")
-    kept = Recording.read(tmp_path / "run.parquet").others["s"]
-    assert len({id(one) for one in kept}) == 2
-    assert [len(one or "") for one in kept[:2]] == [400_000, 0]
-
-
-def test_packed_variables_count_by_what_they_unpack_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_packed_variables_and_texts_count_by_what_they_unpack_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cells = np.empty(50, dtype=object)
     cells[:] = [np.zeros(1000) for _ in cells]
     savemat(tmp_path / "run.mat", AXIS | {"c": cells}, do_compression=True)
@@ -74,6 +65,15 @@ def test_packed_variables_count_by_what_they_unpack_to(tmp_path: Path, monkeypat
     monkeypatch.setattr(limits, "UNPACKED", 300_000)
     with pytest.raises(RecordingError, match=r"unpacks to .* may unpack to 300 kB.*--layout limit=2"):
         Recording.read(tmp_path / "run.mat")
+    monkeypatch.undo()
+    path, text = tmp_path / "run.parquet", "x" * 400_000
+    parquet.write_table(pa.table(AXIS | {"s": [text, None] * 200}), path)
+    kept = Recording.read(path).others["s"]
+    assert len({id(one) for one in kept}) == 2
+    assert [len(one or "") for one in kept[:2]] == [400_000, 0]
+    parquet.write_table(pa.table(AXIS | {"s": ["x" * 600_000] * 400}), path)
+    with pytest.raises(RecordingError, match=rf"column s {LARGE}.*--layout limit=2"):
+        Recording.read(path)
 
 
 def test_a_topic_of_images_is_left_out_by_name_and_the_joints_are_read(tmp_path: Path) -> None:
@@ -124,15 +124,6 @@ def test_what_leads_to_another_file_is_refused(tmp_path: Path, make: crafted.Mak
         Recording.read(path)
 
 
-def test_a_link_within_the_file_is_no_harm(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        run = file.create_group("run")
-        run["t"], run["tau"], run["q"] = T, np.cos(T), np.sin(T)
-        file["latest"] = h5py.SoftLink("/run")
-        run["above"] = file
-    assert np.array_equal(Recording.read(tmp_path / "run.h5").table["q"], np.sin(T))
-
-
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
@@ -150,12 +141,21 @@ def test_what_costs_more_than_it_holds_is_refused(tmp_path: Path, make: crafted.
         Recording.read(tmp_path / "run.h5")
 
 
-def test_numbers_that_were_never_written_are_counted_before_memory_is_taken(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        for name in ("t", "tau", "q"):
+def test_numbers_that_were_never_written_are_counted_and_links_and_odd_units_are_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        run = file.create_group("run")
+        run.update(AXIS)
+        file["latest"] = h5py.SoftLink("/run")
+        run["above"] = file
+    assert np.array_equal(Recording.read(path).table["q"], np.sin(T))
+    crafted.large_attribute(Random(1), path)
+    assert set(Recording.read(path).units) == {"t"}  # a unit that is no text states none
+    with h5py.File(path, "w") as file:
+        for name in AXIS:
             file.create_dataset(name, (80_000_000,), "f8", chunks=(1 << 20,), compression="gzip")
     with pytest.raises(RecordingError, match=r"holds 240,000,000 numbers; .* --layout limit=10\."):
-        Recording.read(tmp_path / "run.h5")
+        Recording.read(path)
 
 
 OPTIONS = [
@@ -182,6 +182,101 @@ def test_chunks_that_are_what_they_say_are_read_and_large_ones_are_unpacked_for_
     assert np.allclose(hdf5.read(tmp_path / "run.h5").values["q"], np.sin(T), atol=1e-5)
 
 
-def test_a_unit_that_is_no_text_states_none(tmp_path: Path) -> None:
-    crafted.large_attribute(Random(1), tmp_path / "run.h5")
-    assert set(Recording.read(tmp_path / "run.h5").units) == {"t"}
+# A library that crashes, hangs or takes too much memory on a file costs a sentence, and the next file is read.
+
+READERS = """
+import os, sys, time
+
+def crash(path):
+    os.abort()
+
+def spin(path):
+    while True:
+        pass
+
+def sleep(path):
+    time.sleep(1000)
+
+def grow(path):
+    return [bytearray(10**7) for _ in range(10**6)]
+
+def fail(path):
+    raise KeyError("block 7 of the file")
+
+def speak(path):
+    print("a library says something", file=sys.stderr)
+    from cosim.data.columns import Columns
+    import numpy as np
+    return Columns({"t": np.arange(3.0)})
+"""
+
+
+@pytest.fixture
+def readers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], apart.Reader]]:
+    """Readers by name, of a module that the process of readers can import too."""
+    (tmp_path / "odd_readers.py").write_text(READERS)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    cell = Cell()
+    monkeypatch.setattr(apart, "_CELL", cell)
+    import odd_readers
+
+    yield lambda name: getattr(odd_readers, name)
+    cell.close()
+    del sys.modules["odd_readers"]
+
+
+@pytest.fixture
+def tight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits that are soon passed; a process that starts beside busy ones has 9 s of the clock."""
+    monkeypatch.setattr(limits, "SECONDS", 0.3)
+    monkeypatch.setattr(limits, "UNPACKED", 30_000_000)
+    monkeypatch.setattr(apart, "PATIENCE", 30.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("crash", r"run\.h5 is damaged: the library that reads \.h5 files crashed on it \(exit code -6\)\."),
+        ("spin", r"run\.h5 took more than 0\.3 s of a processor to read; .* --layout limit=3\."),
+        ("sleep", r"run\.h5 took more than 0\.3 s of a processor to read; .* --layout limit=3\."),
+        ("grow", r"run\.h5 takes more memory to read than what unpacks to 30 MB does; .* --layout limit=2\."),
+        ("fail", r"run\.h5 cannot be read as \.h5: 'block 7 of the file'\."),
+    ],
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+@pytest.mark.usefixtures("tight")
+def test_a_reader_that_fails_costs_a_sentence_and_the_next_file_is_read(
+    tmp_path: Path, readers: Callable[[str], apart.Reader], capfd: pytest.CaptureFixture[str], name: str, sentence: str
+) -> None:
+    path = tmp_path / "run.h5"
+    path.write_bytes(b"x")
+    with pytest.MonkeyPatch.context() as patch:
+        if name == "sleep":  # it ends alike, however soon, and nothing is done meanwhile
+            patch.setattr(apart, "PATIENCE", 3.0)
+        with pytest.raises(RecordingError, match=sentence):
+            apart.read_apart(path, ".h5", readers(name))
+    assert list(apart.read_apart(path, ".h5", readers("speak")).values["t"]) == [0, 1, 2]
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("name", "package"), [("run.h5", "h5py"), ("run.mf4", "asammdf")])
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+@pytest.mark.usefixtures("readers")
+def test_a_format_whose_package_is_missing_says_how_to_get_it(tmp_path: Path, name: str, package: str) -> None:
+    # Where this package is installed beside the reader's, no other folder comes before them: the import is forbidden.
+    (tmp_path / "sitecustomize.py").write_text(f"import sys\nsys.modules[{package!r}] = None\n")
+    (tmp_path / name).write_text("x")
+    with pytest.raises(MissingPackageError, match=rf'needs the package {package} to be read: pip install "{package}>='):
+        Recording.read(tmp_path / name)
+
+
+def test_what_a_reader_returns_arrives_whole(tmp_path: Path) -> None:
+    t = np.arange(400) * 1e-2
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["t"], file["tau"], file["q"], file["gain"] = t, np.cos(t), np.sin(t), np.zeros(7)
+        file["q"].attrs["unit"] = "deg"
+    read = Recording.read(tmp_path / "run.h5")
+    assert np.allclose(read.table["q"], np.radians(np.sin(t)))
+    assert read.units["q"] == "rad"
+    assert any("left out: gain (7)" in note for note in read.notes)

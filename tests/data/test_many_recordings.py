@@ -1,7 +1,6 @@
 """One recording of a file that holds many: by column, by number, in every place where a recording is named."""
 
 import re
-import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -67,7 +66,7 @@ def test_one_is_taken_by_column_or_number(path: Path, table: pd.DataFrame, which
     assert one.origin["file"]["rows"] == f"{run * ROWS + 1:,} to {(run + 1) * ROWS:,}"
 
 
-def test_the_refusal_says_how_many_there_are_and_how_one_is_taken(path: Path) -> None:
+def test_the_refusal_says_how_many_there_are_and_how_one_is_taken(path: Path, table: pd.DataFrame) -> None:
     with pytest.raises(ManyRecordingsError) as caught:
         Recording.read(path)
     said = str(caught.value)
@@ -76,29 +75,29 @@ def test_the_refusal_says_how_many_there_are_and_how_one_is_taken(path: Path) ->
     for run, one in enumerate(caught.value.runs):  # what is offered can be taken
         assert Recording.read(f"{path}:{one.which}")["q"][0] == run + 1
         assert (one.first, one.rows) == (run * ROWS, ROWS)
+    with pytest.raises(RecordingError, match=r"Split the file there[^:#]*$"):  # a table in memory is no file
+        Recording.of({name: table[name].to_numpy() for name in ("t", "tau", "q")})
 
 
-def test_where_no_column_tells_them_apart_they_have_numbers(tmp_path: Path, table: pd.DataFrame) -> None:
-    path = tmp_path / "day.csv"
-    table[["t", "tau", "q"]].to_csv(path, index=False)
-    with pytest.raises(ManyRecordingsError, match=re.escape("take one, day.csv:#1 to #3.")):
-        Recording.read(path)
+NUMBERS, RUNS = ["#1", "#2", "#3"], ["run=4", "run=5", "run=7"]
 
 
-def test_one_column_that_suffices_is_offered_alone(tmp_path: Path, table: pd.DataFrame) -> None:
+@pytest.mark.parametrize(
+    ("more", "offered"),
+    [
+        pytest.param({"drive": "lead", "speed": 1.0}, NUMBERS, id="where no column tells them apart they have numbers"),
+        pytest.param({"run": np.repeat([4, 5, 7], ROWS).astype(np.int16)}, RUNS, id="one column that suffices"),
+        pytest.param({"drive": np.repeat(["a/b", "a,b", "c"], ROWS), "speed": 1.0}, NUMBERS, id="what none can type"),
+    ],
+)
+def test_what_is_offered_is_the_least_that_can_be_typed(
+    tmp_path: Path, table: pd.DataFrame, more: dict[str, object], offered: list[str]
+) -> None:
     path = tmp_path / "day.parquet"
-    table.assign(run=np.repeat([4, 5, 7], ROWS).astype(np.int16)).to_parquet(path, index=False)
-    with pytest.raises(ManyRecordingsError) as caught:
+    table.assign(**more).to_parquet(path, index=False)
+    with pytest.raises(ManyRecordingsError, match=f"take one, day.parquet:{offered[0]}") as caught:
         Recording.read(path)
-    assert [one.which for one in caught.value.runs] == ["run=4", "run=5", "run=7"]
-
-
-def test_values_that_cannot_be_typed_leave_numbers(tmp_path: Path, table: pd.DataFrame) -> None:
-    path = tmp_path / "day.parquet"
-    table.assign(drive=np.repeat(["a/b", "a,b", "c"], ROWS), speed=1.0).to_parquet(path, index=False)
-    with pytest.raises(ManyRecordingsError) as caught:
-        Recording.read(path)
-    assert [one.which for one in caught.value.runs] == ["#1", "#2", "#3"]
+    assert [one.which for one in caught.value.runs] == offered
 
 
 @pytest.mark.parametrize(
@@ -122,15 +121,6 @@ def test_what_is_not_there_is_a_sentence(path: Path, which: str, sentence: str) 
     assert str(caught.value).startswith(str(path))
 
 
-def test_a_file_with_a_colon_in_its_name_is_a_file(tmp_path: Path, table: pd.DataFrame) -> None:
-    path = tmp_path / "day:#2.csv"
-    try:
-        table[:ROWS].to_csv(path, index=False)
-    except OSError:
-        pytest.skip("this file system takes no colon")
-    assert len(Recording.read(path)) == ROWS
-
-
 def test_options_of_the_file_hold_for_its_recordings(tmp_path: Path, table: pd.DataFrame) -> None:
     path = tmp_path / "day.csv"
     table.rename(columns={"tau": "x", "t": "clock"}).to_csv(path, index=False)
@@ -148,13 +138,6 @@ def test_a_recording_of_the_same_file_may_be_held_out_and_the_same_rows_may_not(
         check_split([first, second], [again])
     with pytest.raises(InputError, match="is given twice, and would count as two recordings"):
         check_split([first, second, Recording.read(f"{path}:#1")], [])
-
-
-def test_a_table_in_memory_is_not_told_to_be_a_file(table: pd.DataFrame) -> None:
-    values = {name: table[name].to_numpy() for name in ("t", "tau", "q")}
-    with pytest.raises(RecordingError, match="Split the file there") as caught:
-        Recording.of(values)
-    assert ":#" not in str(caught.value)
 
 
 def test_show_lists_them_and_previews_one(path: Path) -> None:
@@ -187,24 +170,17 @@ def agrees(seen: Recording) -> None:
     np.testing.assert_allclose(seen["tau"], tau(seen.t - seen.t[0] + 3e-4), atol=3e-5)
 
 
-def test_files_of_one_run_are_joined_and_named_in_a_note(tmp_path: Path) -> None:
+def test_files_of_one_run_are_joined_and_named_in_a_note_and_a_folder_of_such_files_is_one(tmp_path: Path) -> None:
     written(tmp_path / "position.csv", "t,q", TQ, q(TQ))
     written(tmp_path / "effort.csv", "t_ms,tau", 1e3 * TA, tau(TA))
+    (tmp_path / "notes.md").write_text("axis 3")
     seen = Recording.read(tmp_path / "position.csv+effort.csv")
-    agrees(seen)
-    assert seen.name == "position+effort"
+    whole = Recording.read(f"{tmp_path / 'position.csv'}+{tmp_path / 'effort.csv'}")
+    for one in (seen, whole, Recording.read(tmp_path)):
+        agrees(one)
+    assert seen.name == whole.name == "position+effort"
     assert "2 files were read as one run: position.csv, effort.csv." in seen.notes[0]
     assert seen.sha256 != Recording.read(tmp_path / "position.csv", required=()).sha256
-    whole = Recording.read(f"{tmp_path / 'position.csv'}+{tmp_path / 'effort.csv'}")
-    agrees(whole)
-    assert whole.name == seen.name
-
-
-def test_a_folder_of_such_files_is_one_run(tmp_path: Path) -> None:
-    written(tmp_path / "position.csv", "time,position", TQ, q(TQ))
-    written(tmp_path / "effort.csv", "time,effort", TA, tau(TA))
-    (tmp_path / "notes.md").write_text("axis 3")
-    agrees(Recording.read(tmp_path))
     written(tmp_path / "other.csv", "t,tau,q", TQ, tau(TQ), q(TQ))
     with pytest.raises(RecordingError, match=r"is not a file but a folder of 3 recordings: other.csv holds torque and"):
         Recording.read(tmp_path)
@@ -222,7 +198,9 @@ def test_columns_of_one_name_are_named_after_their_files(tmp_path: Path) -> None
     np.testing.assert_allclose(seen["v"], 0.9 * tau(seen.t), atol=1e-4)
 
 
-def test_one_value_a_line_and_the_times_in_a_file_of_their_own(tmp_path: Path) -> None:
+def test_times_may_be_in_a_file_of_their_own_or_dates_of_several_kinds(
+    tmp_path: Path,
+) -> None:
     for name, column in (("time", TA), ("positions", q(TA)), ("torques", tau(TA))):
         written(tmp_path / f"{name}.txt", "", column)
     seen = Recording.read(tmp_path / "time.txt+positions.txt+torques.txt")
@@ -230,9 +208,12 @@ def test_one_value_a_line_and_the_times_in_a_file_of_their_own(tmp_path: Path) -
     alone = preview(tmp_path / "positions.txt", {"layout": {"period": "1ms"}, "columns": {"q": "#1"}})
     assert "one column of numbers" in alone.recording.notes[0]
     np.testing.assert_allclose(alone.recording["q"], q(TA), atol=1e-8)
-
-
-def test_dates_of_several_kinds_are_one_time(tmp_path: Path) -> None:
+    written(tmp_path / "a.csv", "t,q", TQ, q(TQ))
+    written(tmp_path / "b.csv", "tau,load", tau(TQ), q(TQ))
+    agrees(Recording.read(tmp_path / "a.csv+b.csv"))
+    written(tmp_path / "b.csv", "tau,load", tau(TA), q(TA))
+    with pytest.raises(RecordingError, match=r"b.csv has no time \(2,000 rows\); name it with --columns t="):
+        Recording.read(tmp_path / "a.csv+b.csv")
     start = datetime(2026, 3, 1, 12, tzinfo=UTC)
     written(tmp_path / "a.csv", "time,position", [str(start + timedelta(seconds=t)) for t in TQ], q(TQ))
     stamps = [str(round(start.timestamp()) * 10**9 + round(1e9 * t)) for t in TA]
@@ -244,15 +225,6 @@ def test_dates_of_several_kinds_are_one_time(tmp_path: Path) -> None:
     agrees(Recording.read(tmp_path / "a.csv+c.csv"))
 
 
-def test_a_file_without_a_time_has_that_of_one_with_as_many_rows_only(tmp_path: Path) -> None:
-    written(tmp_path / "a.csv", "t,q", TQ, q(TQ))
-    written(tmp_path / "b.csv", "tau,load", tau(TQ), q(TQ))
-    agrees(Recording.read(tmp_path / "a.csv+b.csv"))
-    written(tmp_path / "b.csv", "tau,load", tau(TA), q(TA))
-    with pytest.raises(RecordingError, match=r"b.csv has no time \(2,000 rows\); name it with --columns t="):
-        Recording.read(tmp_path / "a.csv+b.csv")
-
-
 def test_files_that_lack_what_the_other_has_are_asked_whether_they_are_one_run(tmp_path: Path) -> None:
     first = written(tmp_path / "position.csv", "t,q", TQ, q(TQ))
     second = written(tmp_path / "effort.csv", "t,tau", TA, tau(TA))
@@ -262,16 +234,22 @@ def test_files_that_lack_what_the_other_has_are_asked_whether_they_are_one_run(t
     agrees(read_recordings([run], {}, None, ["position.csv+effort.csv:q=rad"], "rotary")[0])
 
 
-def test_a_file_whose_name_has_the_sign_is_one_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["a+b.csv", "day:#2.csv"])
+def test_a_file_whose_name_has_the_sign_is_one_file(tmp_path: Path, name: str) -> None:
     written(tmp_path / "a.csv", "t,q", TQ, q(TQ))
-    path = written(tmp_path / "a+b.csv", "t,tau,q", TQ, tau(TQ), q(TQ))
-    assert Recording.read(path).name == "a+b"
-    with pytest.raises(RecordingError, match=r"a.csv\+gone.csv does not exist"):
-        Recording.read(tmp_path / "a.csv+gone.csv")
-    shutil.rmtree(tmp_path / "empty", ignore_errors=True)
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(RecordingError, match="is not a file"):
-        Recording.read(tmp_path / "empty")
+    try:
+        path = written(tmp_path / name, "t,tau,q", TQ, tau(TQ), q(TQ))
+    except OSError:
+        pytest.skip("this file system takes no colon")
+    assert (Recording.read(path).name, len(Recording.read(path))) == (name.removesuffix(".csv"), len(TQ))
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"), [("a.csv+gone.csv", r"a.csv\+gone.csv does not exist"), ("", "is not a file")]
+)
+def test_files_that_are_not_there_and_an_empty_folder_are_refused(tmp_path: Path, name: str, rule: str) -> None:
+    with pytest.raises(RecordingError, match=rule):
+        Recording.read(tmp_path / name)
 
 
 # Command line and page know each kind of file that is read.

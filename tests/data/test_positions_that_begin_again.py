@@ -91,29 +91,22 @@ def test_the_range_that_a_drive_sends_is_continued(half: float, unit: str) -> No
     assert "begins again at" in note
 
 
-def test_an_axis_that_rests_at_the_end_of_a_turn_is_continued() -> None:
-    rng = np.random.default_rng(5)
-    q = np.where(T < 1, 0.0, 0.4 * np.sin(3 * (T - 1))) + rng.normal(0, 1e-3, ROWS)
-    joined, _ = read(np.mod(q, 2 * pi))
-    np.testing.assert_allclose(joined - joined[0], q - q[0], atol=1e-9)
+SWING = 8 * np.sin(2 * T)
+ENDS = np.flatnonzero(np.abs(np.diff(np.mod(SWING, 2 * pi))) > pi)
+NOISE = np.random.default_rng(5).normal(0, 1e-3, ROWS)
+TURNED = {
+    "an axis that rests at the end of a turn": (np.where(T < 1, 0.0, 0.4 * np.sin(3 * (T - 1))) + NOISE, T >= 0, 0.0),
+    "rows that are missing where it begins again": (SWING, np.abs(np.arange(ROWS) - ENDS[1] + 0.5) > 8, 0.0),
+    "a false reading": (SWING, T >= 0, 2.9),
+}
 
 
-def test_rows_that_are_missing_where_a_position_begins_again_do_not_hide_it() -> None:
-    q = 8 * np.sin(2 * T)
-    wrapped = np.mod(q, 2 * pi)
-    ends = np.flatnonzero(np.abs(np.diff(wrapped)) > pi)
-    kept = np.ones(ROWS, bool)
-    kept[ends[1] - 8 : ends[1] + 8] = False
+@pytest.mark.parametrize("what", TURNED)
+def test_a_turn_is_continued_at_rest_over_a_hole_and_beside_a_false_reading(what: str) -> None:
+    q, kept, wrong = TURNED[what]
+    wrapped = np.mod(q + wrong * (np.arange(ROWS) == 1500), 2 * pi)
     joined, _ = read(wrapped[kept], "", T[kept])
-    np.testing.assert_allclose(joined - joined[0], (q - q[0])[kept], atol=1e-9)
-
-
-def test_a_false_reading_does_not_hide_the_turns() -> None:
-    q = 8 * np.sin(2 * T)
-    wrapped = np.mod(q, 2 * pi)
-    wrapped[1500] = (wrapped[1500] + 2.9) % (2 * pi)
-    joined, _ = read(wrapped)
-    right = np.delete(joined - q, 1500)
+    right = (joined - q[kept])[np.arange(ROWS)[kept] != 1500]
     np.testing.assert_allclose(right, right[0], atol=1e-9)
 
 
@@ -177,13 +170,9 @@ def test_a_counter_is_read_so_with_its_set_point() -> None:
     np.testing.assert_allclose(made["q"] - made["q"][0], np.deg2rad(0.001 * (counts - counts[0])), atol=1e-9)
     np.testing.assert_allclose(made["q_d"] - made["q"], np.deg2rad(0.04), atol=1e-9)
     assert made.notes == ('table: "q" begins again at 65,536; its turns were counted, from the first row on.',)
-
-
-def test_a_position_comes_to_the_turn_of_a_set_point_that_goes_on() -> None:
-    """So positions of several recordings have one zero."""
-    q = 5 + 9 * np.sin(2 * T)
-    made, _ = continued("run", {"q": np.mod(q, 2 * pi), "q_d": q + 0.01}, {})
-    np.testing.assert_allclose(made["q"], q, atol=1e-9)
+    # A position comes to the turn of a set point that goes on: so those of several recordings have one zero.
+    table, _ = continued("run", {"q": np.mod(5 + SWING, 2 * pi), "q_d": 5.01 + SWING}, {})
+    np.testing.assert_allclose(table["q"], 5 + SWING, atol=1e-9)
 
 
 @pytest.mark.parametrize("half", [12.5, 95.5])
@@ -205,58 +194,39 @@ Q = 3.0 * np.sin(0.9 * TIMES) + 2.5 * TIMES
 TAU = np.rint(400 * np.sin(1.3 * TIMES))
 
 
-def test_a_set_point_that_steps_by_a_turn_is_no_register() -> None:
-    table, notes = continued("run", {"q": 0.1 * Q, "q_d": np.where(TIMES > 4, 2 * np.pi, 0.0)}, {})
+STAYS = {
+    "a whole position": {"q": Q},
+    "a position that begins again at no turn": {"q": np.mod(Q, 5.0)},
+    "one false reading": {"q": np.where(np.arange(len(TIMES)) == 50, -np.pi, Q)},
+    "a position that is too fast to tell": {"q": np.mod(1e3 * Q, 2 * np.pi)},
+    "a position of more than a turn": {"q": np.mod(Q, 2 * np.pi) + 1.5 * (TIMES > 4)},
+    "a set point that steps by a turn": {"q": 0.1 * Q, "q_d": np.where(TIMES > 4, 2 * np.pi, 0.0)},
+    "a signed torque": {"tau": TAU},
+    "a torque that is never negative": {"tau": TAU + 400},
+    "a torque that is on and off": {"tau": np.where(TAU > 0, 65.0, 0.0)},
+    "a torque of two values": {"tau": np.where(TAU > 0, 65535.0, 0.0) * (TIMES > 1)},
+    "a torque without steps": {"tau": np.where(TAU < 0, TAU + 65536, TAU) + 0.3 * np.sin(7 * TIMES)},
+    "a torque of no register": {"tau": np.where(TAU < 0, TAU + 40000, TAU)},
+    "no torque": {"tau": np.zeros(len(TIMES))},
+}
+
+
+@pytest.mark.parametrize("what", STAYS)
+def test_what_is_no_register_stays(what: str) -> None:
+    table, notes = continued("run", dict(STAYS[what]), {})
+    assert all(table[name] is read for name, read in STAYS[what].items())
     assert notes == ()
-    assert set(table["q_d"]) == {0.0, 2 * np.pi}
+
+
+COARSE = np.rint(2.69 * np.rint(TAU / 2.69))
+"""A current in steps of 2.69 mA, written as whole mA: it fills a register in threes and twos."""
 
 
 @pytest.mark.parametrize(
-    "read",
-    [
-        Q,
-        np.mod(Q, 5.0),
-        np.where(np.arange(len(TIMES)) == 50, -np.pi, Q),
-        np.mod(1e3 * Q, 2 * np.pi),
-        np.mod(Q, 2 * np.pi) + 1.5 * (TIMES > 4),
-    ],
-    ids=["whole", "no turn", "one false reading", "too fast to tell", "more than a turn"],
+    ("counts", "bits", "step"), [(TAU, 16, 1.0), (TAU, 16, 0.00045), (TAU, 32, 1.0), (TAU, 16, 2.5), (COARSE, 16, 1.0)]
 )
-def test_a_position_that_does_not_begin_again_at_a_turn_stays(read: np.ndarray) -> None:
-    table, notes = continued("run", {"q": read}, {})
-    assert table["q"] is read
-    assert notes == ()
-
-
-@pytest.mark.parametrize(("bits", "step"), [(16, 1.0), (16, 0.00045), (32, 1.0), (16, 2.5)])
-def test_a_number_that_lost_its_sign_gets_it_back(bits: int, step: float) -> None:
-    read = np.round(np.where(TAU < 0, TAU + 2.0**bits, TAU) * step, 6)
+def test_a_number_that_lost_its_sign_gets_it_back(counts: np.ndarray, bits: int, step: float) -> None:
+    read = np.round(np.where(counts < 0, counts + 2.0**bits, counts) * step, 6)
     table, (note,) = continued("run", {"tau": read}, {})
-    np.testing.assert_allclose(table["tau"], step * TAU, atol=0.01 * step)
+    np.testing.assert_allclose(table["tau"], step * counts, atol=0.01 * step)
     assert note.startswith('run: "tau" was written without its sign; ')
-
-
-@pytest.mark.parametrize(
-    "read",
-    [
-        TAU,
-        TAU + 400,
-        np.where(TAU > 0, 65.0, 0.0),
-        np.where(TAU > 0, 65535.0, 0.0) * (TIMES > 1),
-        np.where(TAU < 0, TAU + 65536, TAU) + 0.3 * np.sin(7 * TIMES),
-        np.where(TAU < 0, TAU + 40000, TAU),
-        np.zeros(len(TIMES)),
-    ],
-    ids=["signed", "never negative", "on and off", "two values", "no steps", "no register", "nothing"],
-)
-def test_a_torque_that_is_no_register_stays(read: np.ndarray) -> None:
-    table, notes = continued("run", {"tau": read}, {})
-    assert table["tau"] is read
-    assert notes == ()
-
-
-def test_a_converter_of_coarse_steps_fills_a_register_in_threes_and_twos() -> None:
-    """A current in steps of 2.69 mA, written as whole mA."""
-    coarse = np.rint(2.69 * np.rint(TAU / 2.69))
-    table, _ = continued("run", {"tau": np.where(coarse < 0, coarse + 65536, coarse)}, {})
-    np.testing.assert_array_equal(table["tau"], coarse)

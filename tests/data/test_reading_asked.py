@@ -59,10 +59,7 @@ ASKED = {
     "one name twice": ("t,tau,q,q\n" + three(",", columns=(T, TAU, Q, Q)), "q may be any of q (#3), q (#4)"),
     "a current": ("time,iq,pos\n" + three(","), 'no torque but a current, "iq". With the torque constant KT of the'),
     "commas that part and commas in numbers": ("t,tau,q\n" + three(",", ","), "has 3 names of columns and 6 fields in"),
-    "no time": (
-        "tau,q\n" + three(",", columns=(TAU, Q)),
-        "if its rows are evenly spaced, say --layout period=1ms.",
-    ),
+    "no time": ("tau,q\n" + three(",", columns=(TAU, Q)), "if its rows are evenly spaced, say --layout period=1ms."),
     "a row that is torn in the middle": (
         ("t,tau,q\n" + three(",")).replace("\n0.1,", "\n0.1\n", 1),
         "row 101 has 1 fields where the others have 3: '0.1'.",
@@ -201,7 +198,7 @@ def test_a_set_point_of_another_name_is_read_beside_our_own_names_and_of_two_non
     assert [note in said for note, said in zip(notes, recording.notes, strict=True)] == [True] * len(notes)
 
 
-def test_where_names_have_to_be_read_it_is_said_what_they_were_taken_for(tmp_path: Path) -> None:
+def test_what_names_were_taken_for_is_said_and_when_a_recording_began_is_kept(tmp_path: Path) -> None:
     text = "time,torque_cmd,torque_act,pos_act,pos_cmd,pos_error\n" + rows(T, TAU, -TAU, Q, 2 * Q, Q)
     recording = as_read(tmp_path, text)
     np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
@@ -209,11 +206,6 @@ def test_where_names_have_to_be_read_it_is_said_what_they_were_taken_for(tmp_pat
     assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"' in said
     assert 'no unit is stated for "torque_cmd" (tau in N.m or N), "pos_act" (q in rad or m)' in said
     assert "were left out: torque_act." in said
-
-
-def test_when_a_recording_began_is_kept_and_a_row_that_stands_in_one_word_with_the_names_is_left_out(
-    tmp_path: Path,
-) -> None:
     stamps = [str(np.datetime64("2024-03-01T23:59:59", "ms") + np.timedelta64(row, "ms")) for row in range(len(T))]
     dated = as_read(tmp_path, "timestamp,torque,angle\n" + rows(stamps, TAU, Q))
     assert dated.origin["start"] == "2024-03-01T23:59:59.000"

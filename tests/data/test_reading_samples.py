@@ -6,11 +6,14 @@ import sqlite3
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from commands import call
+from mcap.reader import make_reader
+from mcap_ros2.writer import Writer
+from scipy.io import savemat
 
 from bench import samples as made
 from cosim.cli import repeated
@@ -18,97 +21,39 @@ from cosim.data.preview import Preview, preview
 from cosim.data.recording import Recording
 from cosim.reading import options_of, read_recordings
 from cosim.support.errors import RecordingError
+from cosim_readers.rosbag import JOINT_STATE
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "tests" / "samples"
 GUIDE = (ROOT / "docs" / "reading.md").read_text("utf-8")
-
-
-ANSWERS = {
-    "halsampler.txt": "--columns tau=#1 q=#2 --units q=deg --layout period=5ms",
-    "halsampler_tagged.txt": '--columns t=#1 tau=#2 q=#3 --units "t=5 ms" q=deg',
-    "halscope.log": "--units q=deg",
-    "odrive_capture.txt": "--columns t=#1 q=#2 tau=#3 --units q=turn",
-    "odrive.csv": '--columns tau=axis0.motor.foc.Iq_measured --units "tau=0.12 N.m"',
-    "vesc_tool.csv": '--columns tau=current_motor --units "tau=0.12 N.m"',
-    "sinamics_trace.csv": f'--units "q={360 / 2**20} deg"',
-    "micro_controller.txt": '--units "q=0.0054931640625 deg"',
-    "two_joints.csv": "--columns tau=az.effort q=az.position",
-    "oscilloscope.csv": "--columns tau=CH1 q=CH2",
+TABLE = {
+    name: (became, said)
+    for name, became, said in re.findall(r"^\| `(\S+)` \| [^|]+ \| (.*?) \| `?(.*?)`? ?\|$", GUIDE, re.M)
 }
-"""What the person who recorded a file knows and the file does not say; of all others nothing is asked."""
-BY_WHOM = {
-    "twincat_scope.csv": "TwinCAT Scope, one time for all",
-    "twincat_scope_all_times.csv": "TwinCAT Scope, a time each, file times",
-    "tia_trace.csv": "Siemens TIA Portal trace, UTF-16",
-    "sinamics_trace.csv": "Siemens SINAMICS trace",
-    "halscope.log": "LinuxCNC halscope",
-    "halsampler.txt": "LinuxCNC halsampler",
-    "halsampler_tagged.txt": "LinuxCNC halsampler -t",
-    "odrive_capture.txt": "ODrive BulkCapture, numpy.savetxt",
-    "odrive.csv": "ODrive, named columns",
-    "moteus.csv": "moteus csv_output",
-    "vesc_tool.csv": "VESC Tool",
-    "plotjuggler.csv": "PlotJuggler, ROS 2 joint states",
-    "PHD2_GuideLog.txt": "PHD2",
-    "german_excel.csv": "German Excel, cp1252, row of units",
-    "labview.lvm": "LabVIEW",
-    "oscilloscope.csv": "an oscilloscope",
-    "iso_logger.csv": "a logger with ISO time stamps",
-    "micro_controller.txt": "a microcontroller",
-    "pandas_index.csv": "pandas with its index",
-    "two_joints.csv": "a robot of two joints, ns since 1970",
-    "ros2.mcap": "ROS 2, MCAP",
-    "ros2.db3": "ROS 2, SQLite bag",
-    "run.mat": "MATLAB, v5",
-    "run.h5": "HDF5",
-    "run.mf4": "MDF4",
-}
-
-
-def binary(name: str, folder: Path) -> Path:
-    path = folder / name
-    BINARY[name](path)
-    return path
-
-
-def _joint_states() -> list[dict[str, Any]]:
-    first = 1_709_331_184_000_000_000
-    stamps = [first + 5_000_000 * row for row in range(made.ROWS)]
-    return [
-        {
-            "header": {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": ""},
-            "name": ["azimuth"],
-            "position": [float(q)],
-            "velocity": [],
-            "effort": [float(tau)],
-        }
-        for stamp, q, tau in zip(stamps, made.Q, made.TAU, strict=True)
-    ]
+"""The table of the guide: a file, what becomes of it, and what the person who recorded it knows and it does not say."""
 
 
 def mcap(path: Path) -> None:
-    writer = pytest.importorskip("mcap_ros2.writer")
-    from cosim_readers.rosbag import JOINT_STATE
-
     with path.open("wb") as file:
-        out = writer.Writer(file)
+        out = Writer(file)
         schema = out.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
         note = out.register_msgdef("std_msgs/msg/Float64", "float64 data")
-        for row, message in enumerate(_joint_states()):
-            out.write_message("/joint_states", schema, message, log_time=row, publish_time=row, sequence=row)
+        for row, (q, tau) in enumerate(zip(made.Q.tolist(), made.TAU.tolist(), strict=True)):
+            stamp = {"sec": 1_709_331_184 + row // 200, "nanosec": 5_000_000 * (row % 200)}
+            lists = {"name": ["azimuth"], "position": [q], "velocity": [], "effort": [tau]}
+            state = {"header": {"stamp": stamp, "frame_id": ""}, **lists}
+            out.write_message("/joint_states", schema, state, log_time=row, publish_time=row, sequence=row)
             out.write_message("/load", note, {"data": 1.0}, log_time=row, publish_time=row, sequence=row)
         out.finish()
 
 
 def bag(path: Path) -> None:
-    reader = pytest.importorskip("mcap.reader")
     mcap(path.with_suffix(".mcap"))
     with sqlite3.connect(path) as base, path.with_suffix(".mcap").open("rb") as file:
         base.execute("CREATE TABLE topics (id INTEGER, name TEXT, type TEXT, serialization_format TEXT)")
         base.execute("CREATE TABLE messages (id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)")
         base.execute("INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr')")
-        messages = reader.make_reader(file).iter_messages(topics=["/joint_states"])
+        messages = make_reader(file).iter_messages(topics=["/joint_states"])
         base.executemany(
             "INSERT INTO messages VALUES (?, 1, ?, ?)",
             [(k, one.log_time, one.data) for k, (_, _, one) in enumerate(messages)],
@@ -117,13 +62,10 @@ def bag(path: Path) -> None:
 
 
 def mat(path: Path) -> None:
-    from scipy.io import savemat
-
     savemat(path, {"run": {"t": made.T, "tau": made.TAU, "q": made.Q}, "mass": 95.1})
 
 
 def hdf5(path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:
         for name, column in {"t": made.T, "tau": made.TAU, "q": made.Q / made.DEG}.items():
             file[f"log/{name}"] = column.reshape(-1, 1)
@@ -146,7 +88,7 @@ BINARY: dict[str, Callable[[Path], None]] = {
     "run.h5": hdf5,
     "run.mf4": mdf,
 }
-READ = [name for name in BY_WHOM if name != "PHD2_GuideLog.txt"]
+READ = [name for name in TABLE if name != "PHD2_GuideLog.txt"]
 TOLERANCE = {
     "micro_controller.txt": 1e-3,
     "sinamics_trace.csv": 1e-5,
@@ -157,7 +99,10 @@ TOLERANCE = {
 
 
 def sample(name: str, folder: Path) -> Path:
-    return binary(name, folder) if name in BINARY else SAMPLES / name
+    if name not in BINARY:
+        return SAMPLES / name
+    BINARY[name](folder / name)
+    return folder / name
 
 
 def options(typed: str) -> dict[str, list[str]]:
@@ -175,7 +120,7 @@ def test_a_sample_is_as_it_is_made(name: str) -> None:
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("name", READ)
 def test_a_file_of_a_machine_gives_its_motion(tmp_path: Path, name: str) -> None:
-    said = options(ANSWERS.get(name, ""))
+    said = options(TABLE[name][1])
     (recording,) = read_recordings(
         [sample(name, tmp_path)], {}, said["columns"], said["units"], "rotary", said["layout"]
     )
@@ -193,19 +138,10 @@ def test_a_guide_log_has_no_torque_and_says_what_it_can(capsys: pytest.CaptureFi
         Recording.read(path)
     assert call("show", path) == 0
     told = capsys.readouterr().out
-    drift, period, amplitude = re.findall(r"RA without corrections: drift (\S+) .* period (\S+) s with \+-(\S+)", told)[
-        0
-    ]
-    assert float(period) == pytest.approx(made.PERIOD, rel=0.02)
-    assert float(amplitude) == pytest.approx(made.TRAIN, rel=0.02)
-    assert float(drift) == pytest.approx(1.2, rel=0.02)
+    pattern = r"RA without corrections: drift (\S+) .* period (\S+) s with \+-(\S+)"
+    (numbers,) = re.findall(pattern, told)
+    np.testing.assert_allclose([float(one) for one in numbers], [1.2, made.PERIOD, made.TRAIN], rtol=0.02)
     assert "4 frames in which the star was lost were left out" in told
-
-
-def test_channels_of_another_sample_time_are_joined_by_time_and_said_so() -> None:
-    recording = Recording.read(SAMPLES / "twincat_scope_all_times.csv")
-    assert '"MotorTemp" (20 Hz, 0 s to 0.75 s) between samples' in " ".join(recording.notes)
-    assert recording.origin["start"].startswith("2024-03-01T22:13:04")
 
 
 NO_TIMES = {
@@ -233,19 +169,14 @@ def test_a_head_that_says_no_time_costs_the_time_alone(tmp_path: Path, what: str
     assert ("scale" in what) == ("the log states no pixel scale" in said)
 
 
-def test_other_topics_of_a_bag_are_named(tmp_path: Path) -> None:
+def test_other_channels_are_joined_and_other_topics_named(tmp_path: Path) -> None:
+    recording = Recording.read(SAMPLES / "twincat_scope_all_times.csv")
+    assert '"MotorTemp" (20 Hz, 0 s to 0.75 s) between samples' in " ".join(recording.notes)
+    assert recording.origin["start"].startswith("2024-03-01T22:13:04")
     recording = Recording.read(sample("ros2.mcap", tmp_path))
     assert "of its topics /joint_states was read; left out: /load." in " ".join(recording.notes)
     with pytest.raises(RecordingError, match=r"is not a file but the folder of a bag; give .*ros2.mcap"):
         Recording.read(tmp_path)
-
-
-def _row(name: str, shown: Preview | None) -> str:
-    if shown is None:
-        return f"| `{name}` | {BY_WHOM[name]} | position only: no torque | |"
-    said = ANSWERS.get(name, "")
-    became = "read" if not (shown.undecided or shown.refused) else "asks"
-    return f"| `{name}` | {BY_WHOM[name]} | {became} | {f'`{said}` ' if said else ''}|"
 
 
 @pytest.fixture(scope="module")
@@ -257,14 +188,17 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Preview]:
 
 @pytest.mark.filterwarnings("default")
 def test_the_table_of_the_guide_is_what_happens_and_nothing_else_is_asked(shown: dict[str, Preview]) -> None:
-    for package in ("mcap_ros2", "h5py", "asammdf"):
-        pytest.importorskip(package)
-    table = "\n".join(_row(name, shown.get(name)) for name in BY_WHOM)
-    assert table in GUIDE, f"docs/reading.md should hold:\n{table}"
+    assert {*TABLE} == {*made.TEXTS, *BINARY}
+    assert TABLE["PHD2_GuideLog.txt"] == ("position only: no torque", "")
     for name, one in shown.items():
         asked = [*one.undecided, *[one.refused] * bool(one.refused)]
-        assert bool(asked) == (name in ANSWERS)
+        assert TABLE[name][0] == ("asks" if asked else "read"), name
+        assert bool(asked) == bool(TABLE[name][1])
         assert all("--" in sentence for sentence in asked)
+        if name not in BINARY and not one.refused:  # the options that are shown can be typed
+            said = options(one.said)
+            parsed = options_of(SAMPLES / name, said["columns"], said["units"], said["layout"])
+            assert preview(SAMPLES / name, parsed).undecided == ()
 
 
 @pytest.mark.parametrize("line", re.findall(r"^cosim show samples/.*$", GUIDE, re.MULTILINE))
@@ -275,40 +209,20 @@ def test_a_recipe_of_the_guide_runs(line: str, capsys: pytest.CaptureFixture[str
     assert "options: " in out or "as an axis: " in out
 
 
-@pytest.mark.filterwarnings("default")
-def test_the_options_that_are_shown_can_be_typed(shown: dict[str, Preview]) -> None:
-    for name, one in shown.items():
-        if name in BINARY or one.refused:
-            continue
-        said = options(one.said)
-        parsed = options_of(SAMPLES / name, said["columns"], said["units"], said["layout"])
-        assert preview(SAMPLES / name, parsed).undecided == ()
-
-
 # A table of several signals in one array is its columns, and many gains are no recording.
 
 
 @pytest.mark.parametrize("kind", ["mat", "h5"])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_table_of_several_signals_is_its_columns(tmp_path: Path, kind: str, turned: bool) -> None:
+def test_a_table_of_several_signals_is_its_columns_beside_many_gains(tmp_path: Path, kind: str, turned: bool) -> None:
     """Simulink logs to arrays of (samples, signals); MATLAB 7.3 writes them the other way round."""
     table = np.column_stack([made.T, made.TAU, made.Q])
-    table = table.T if turned else table
+    arrays = {"data": table.T if turned else table, "gains": np.ones((4, 100))}
     if kind == "mat":
-        from scipy.io import savemat
-
-        savemat(tmp_path / "run.mat", {"data": table, "gains": np.eye(3)})
+        savemat(tmp_path / "run.mat", arrays)
     else:
-        with pytest.importorskip("h5py").File(tmp_path / "run.h5", "w") as file:
-            file["data"], file["gains"] = table, np.eye(3)
+        with h5py.File(tmp_path / "run.h5", "w") as file:
+            file.update(arrays)
     run = Recording.read(tmp_path / f"run.{kind}", {"t": "data_1", "tau": "data_2", "q": "data_3"})
-    np.testing.assert_allclose(run["tau"], made.TAU)
-    np.testing.assert_allclose(run["q"], made.Q)
+    np.testing.assert_allclose([run["tau"], run["q"]], [made.TAU, made.Q])
     assert set(run.columns) == {"t", "tau", "q"}
-
-
-def test_many_columns_of_gains_do_not_outnumber_the_vectors_of_a_recording(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "run.mat", {"t": made.T, "tau": made.TAU, "q": made.Q, "gains": np.ones((4, 100))})
-    assert set(Recording.read(tmp_path / "run.mat").columns) == {"t", "tau", "q"}

@@ -147,10 +147,7 @@ READ = {
     # signs around the numbers
     "semicolons at the end of rows of blanks": ("% t tau q\n" + rows(*S, separator=" ", end=";"), S),
     "semicolons at the end of rows of commas": ("%t,tau,q\n" + rows(*S, end=";"), S),
-    "a matrix of MATLAB": (
-        "% t tau q\nlog = [\n" + rows(*S, separator=" ", end=";") + "];\n",
-        S,
-    ),
+    "a matrix of MATLAB": ("% t tau q\nlog = [\n" + rows(*S, separator=" ", end=";") + "];\n", S),
     "comments between the rows": (
         "t tau q\n" + re.sub(r"(?m)^(0\.5 .*)$", r"% the load 1\n\1", rows(*S, separator=" ")),
         S,

@@ -17,32 +17,21 @@ WRITTEN = json.loads((OLD / "diagnosis.json").read_text("utf-8"))
 SCHEMA = json.loads((files("cosim.delivery") / "schema.json").read_text("utf-8"))
 
 
-def test_a_diagnosis_of_0_1_0_is_valid_by_the_schema_of_today() -> None:
-    assert WRITTEN["version"] == "0.1.0"
-    assert WRITTEN["policy"] == "evidence 2"
-    Draft202012Validator(SCHEMA).validate(WRITTEN)
-
-
-def test_a_diagnosis_of_0_1_0_is_shown() -> None:
-    shown = cosim.show(OLD)
-    assert shown.facts["missing"] == "friction_asymmetry, cogging"
-    answers = {row["effect"]: row["answer"] for row in shown.tables["effects"]}
-    assert answers == {
-        "friction_asymmetry": "detected",
-        "cogging": "detected",
-        "presliding": "not testable",
-        "backlash": "not detected",
-    }
-
-
-def test_a_diagnosis_without_a_ledger_is_refused_by_why_in_one_sentence() -> None:
-    with pytest.raises(InputError, match=r"diagnosis.json holds no ledger; .* a version before 0\.2\. Diagnose again"):
-        read_ledger(OLD)
-
-
-def test_an_improved_card_of_0_1_0_is_read_with_its_effects_and_origin() -> None:
+def test_card_and_diagnosis_of_0_1_0_are_read_and_shown_and_a_missing_ledger_is_one_sentence() -> None:
     card = read_card(OLD / "card.toml")
     assert card.origin is not None
     assert card.origin["version"] == "0.1.0"
     assert [one.id for one in card.plant().effects] == ["friction_asymmetry", "cogging"]
     assert card.plant().model().parameters
+    assert (WRITTEN["version"], WRITTEN["policy"]) == ("0.1.0", "evidence 2")
+    Draft202012Validator(SCHEMA).validate(WRITTEN)
+    shown = cosim.show(OLD)
+    assert shown.facts["missing"] == "friction_asymmetry, cogging"
+    assert {row["effect"]: row["answer"] for row in shown.tables["effects"]} == {
+        "friction_asymmetry": "detected",
+        "cogging": "detected",
+        "presliding": "not testable",
+        "backlash": "not detected",
+    }
+    with pytest.raises(InputError, match=r"diagnosis.json holds no ledger; .* a version before 0\.2\. Diagnose again"):
+        read_ledger(OLD)

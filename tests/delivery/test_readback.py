@@ -67,19 +67,22 @@ def delivered(tmp_path_factory: pytest.TempPathFactory) -> Delivered:
     return Delivered(card, runs[:2], runs[2], told, read_card(out / "card.toml"), outcome.proposed)
 
 
-def test_something_was_found_to_speak_of(delivered: Delivered) -> None:
-    assert in_model(delivered)
-
-
-def test_the_held_out_errors_are_those_of_the_card_given_refitted_and_written(delivered: Delivered) -> None:
+def test_the_held_out_errors_are_those_of_the_cards_given_refitted_written_and_proposed_by_training(
+    delivered: Delivered,
+) -> None:
+    assert in_model(delivered), "something was found to speak of"
     held, runs = delivered.told["heldout"], [delivered.held]
     band = Band(held["cutoff_hz"], held["motion_hz"])
     for name in ("nominal", "before", "after"):
         plant = getattr(delivered.models, name)
         assert heldout_rms(runs, plant, band) == pytest.approx(held[f"{name}_rms"], rel=ROUNDING), name
+    proposed = heldout_rms(runs, delivered.proposed.plant(), band)
+    assert held["unvetoed_rms"] == pytest.approx(proposed, rel=ROUNDING)  # without a veto
+    beside = black_box_rms(traces(delivered.train, runs, delivered.models))
+    assert held["black_box_rms"] == pytest.approx(beside, rel=CONVERGED)  # one that is learned from the same cards
 
 
-def test_the_errors_in_clear_motion_are_those_of_the_same_cards(delivered: Delivered) -> None:
+def test_the_errors_in_clear_motion_the_floor_and_the_range_are_those_of_the_same_cards(delivered: Delivered) -> None:
     clear = delivered.told["heldout"]["clear_motion"]
     prepared = prepare([delivered.held], delivered.band)
     v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
@@ -88,9 +91,6 @@ def test_the_errors_in_clear_motion_are_those_of_the_same_cards(delivered: Deliv
     for name in ("before", "after"):
         left = np.concatenate(residuals(prepared, getattr(delivered.models, name)))[moving]
         assert rms(left) == pytest.approx(clear[f"{name}_rms"], rel=ROUNDING), name
-
-
-def test_floor_and_range_are_those_of_the_written_card(delivered: Delivered) -> None:
     held, added = delivered.told["heldout"], {one.id for one in delivered.proposed.effects}
     again = judge([delivered.held], delivered.models, delivered.band)
     assert again.floor_rms == pytest.approx(held["floor_rms"], rel=ROUNDING)
@@ -101,30 +101,11 @@ def test_floor_and_range_are_those_of_the_written_card(delivered: Delivered) -> 
     assert held["confidence_interval"][0] < gain < held["confidence_interval"][1]
 
 
-def test_the_error_without_a_veto_is_that_of_what_training_proposed(delivered: Delivered) -> None:
-    held = delivered.told["heldout"]
-    proposed = heldout_rms([delivered.held], delivered.proposed.plant(), Band(held["cutoff_hz"], held["motion_hz"]))
-    assert held["unvetoed_rms"] == pytest.approx(proposed, rel=ROUNDING)
-
-
-def test_the_error_beside_a_black_box_is_one_learned_from_the_same_cards(delivered: Delivered) -> None:
-    again = black_box_rms(traces(delivered.train, [delivered.held], delivered.models))
-    assert again is not None
-    assert delivered.told["heldout"]["black_box_rms"] == pytest.approx(again, rel=CONVERGED)
-
-
-def test_the_origin_of_the_card_says_the_same_errors(delivered: Delivered) -> None:
-    held = delivered.told["heldout"]
-    evidence = str(delivered.better.origin["evidence"])
+def test_the_origin_of_the_card_says_the_same_errors_recordings_version_and_date(delivered: Delivered) -> None:
+    held, origin, told = delivered.told["heldout"], delivered.better.origin, delivered.told["provenance"]
+    evidence = str(origin["evidence"])
     assert f"{held['before_rms']:.4g} refitted, {held['after_rms']:.4g} with" in evidence
-    numbers = [float(one) for one in re.findall(r"\d[\d.e+-]*", evidence)]
-    band = Band(held["cutoff_hz"], held["motion_hz"])
-    again = [heldout_rms([delivered.held], one, band) for one in (delivered.models.before, delivered.models.after)]
-    assert numbers == pytest.approx(again, rel=ROUNDING), "there is no other number in it"
-
-
-def test_the_origin_of_the_card_names_the_same_recordings_version_and_date(delivered: Delivered) -> None:
-    origin, told = delivered.better.origin, delivered.told["provenance"]
+    assert len(re.findall(r"\d[\d.e+-]*", evidence)) == 2, "there is no other number in it"
     assert set(origin) == {"version", "date", "card", "recordings", "evidence", "operational_domain"}
     assert origin["operational_domain"]["speed"]["low"] == repr(delivered.told["improved"]["speed"][0])
     assert [origin["version"], origin["date"]] == [told["version"], told["date"]]
@@ -132,24 +113,24 @@ def test_the_origin_of_the_card_names_the_same_recordings_version_and_date(deliv
     assert origin["card"] == told["card"]["name"] == "card.toml"
     named = [{key: one[key] for key in ("name", "sha256", "role")} for one in told["recordings"]]
     assert origin["recordings"] == named
-    assert [(one["name"], one["role"]) for one in named] == [
-        ("train_1", "train"),
-        ("train_2", "train"),
-        ("heldout", "heldout"),
-    ]
+    roles = [("train_1", "train"), ("train_2", "train"), ("heldout", "heldout")]
+    assert [(one["name"], one["role"]) for one in named] == roles
 
 
-def test_the_parameters_are_those_of_the_written_effects(delivered: Delivered) -> None:
+def test_the_parameters_and_their_ranges_are_those_of_the_written_card(delivered: Delivered) -> None:
     for told in in_model(delivered):
         (effect,) = (one for one in delivered.better.effects if one.id == told["effect"])
         written = {variable.name: variable.start for variable in parameters_of(effect)}
         assert {name: told["parameters"][name] for name in written} == pytest.approx(written, rel=ROUNDING)
-
-
-def test_the_base_parameters_are_those_of_the_written_card(delivered: Delivered) -> None:
+        assert set(told["standard_errors"]) <= set(told["parameters"])
+        for name, error in told["standard_errors"].items():
+            low, high = told["ranges"][name]
+            assert (low + high) / 2 == pytest.approx(told["parameters"][name], rel=ROUNDING)
+            assert high - low == pytest.approx(2 * 1.96 * error, rel=ROUNDING)
     written = {variable.name: variable.start for variable in delivered.better.plant().parameters()}
     for name, (_, _, after) in delivered.told["base_parameters"].items():
         assert written[name] == pytest.approx(after, rel=ROUNDING), name
+    assert set(free_parameters(delivered.card.plant())) <= set(written), "free numbers that the fit knows"
 
 
 def test_each_gain_is_what_the_written_model_loses_without_the_effect(delivered: Delivered) -> None:
@@ -163,15 +144,6 @@ def test_each_gain_is_what_the_written_model_loses_without_the_effect(delivered:
         assert f"removes {100 * told['gain']:.0f} % of the error energy" in told["evidence"]
 
 
-def test_the_ranges_are_the_standard_errors_of_the_written_numbers(delivered: Delivered) -> None:
-    for told in in_model(delivered):
-        assert set(told["standard_errors"]) <= set(told["parameters"])
-        for name, error in told["standard_errors"].items():
-            low, high = told["ranges"][name]
-            assert (low + high) / 2 == pytest.approx(told["parameters"][name], rel=ROUNDING)
-            assert high - low == pytest.approx(2 * 1.96 * error, rel=ROUNDING)
-
-
 def test_every_effect_has_a_bound_or_a_reason(delivered: Delivered) -> None:
     assert len(delivered.told["effects"]) >= 21
     for told in delivered.told["effects"]:
@@ -182,10 +154,6 @@ def test_every_effect_has_a_bound_or_a_reason(delivered: Delivered) -> None:
             assert bound["unit"]
             assert bound["range"]
             assert bound["band_hz"][1] > 0
-
-
-def test_a_model_that_is_written_has_free_numbers_that_the_fit_knows(delivered: Delivered) -> None:
-    assert set(free_parameters(delivered.card.plant())) <= {v.name for v in delivered.better.plant().parameters()}
 
 
 def in_model(delivered: Delivered) -> list[dict[str, Any]]:

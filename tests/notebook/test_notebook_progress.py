@@ -1,6 +1,5 @@
 """Progress in a notebook: one line that is written over and gone at the end; nothing elsewhere."""
 
-import inspect
 import sys
 from inspect import Parameter, signature
 from pathlib import Path
@@ -58,18 +57,16 @@ def test_a_line_is_shown_and_gone_at_the_end(line: list[str]) -> None:
     assert line[-1] == ""
 
 
-def test_who_is_told_himself_sees_no_line(line: list[str]) -> None:
+def test_who_is_told_himself_sees_no_line_and_outside_a_notebook_none_is_shown(
+    line: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     told: list[str] = []
     work(on_progress=told.append)
-    assert (told, line) == (["first", "at once after it"], [])
-
-
-def test_outside_a_notebook_nothing_is_shown(line: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: None)
     work()
     monkeypatch.delitem(sys.modules, "IPython")
     assert work() == "done"
-    assert line == []
+    assert (told, line) == (["first", "at once after it"], [])
 
 
 def test_a_diagnosis_in_a_notebook_shows_its_stages(line: list[str], tmp_path: Any) -> None:
@@ -80,11 +77,6 @@ def test_a_diagnosis_in_a_notebook_shows_its_stages(line: list[str], tmp_path: A
     assert line[0].startswith("stage 1 of 3: ")
     assert any(one.startswith("stage 2 of 3: ") for one in line)
     assert line[-1] == ""
-
-
-@pytest.mark.parametrize("verb", ["diagnose", "investigate", "sweep"])
-def test_the_signature_stays_what_it_is(verb: str) -> None:
-    assert signature(getattr(cosim, verb)).parameters["on_progress"].kind is Parameter.KEYWORD_ONLY
 
 
 # Results in a notebook: one line each, tables, figures; and Python calls that offer what the command line does.
@@ -109,13 +101,6 @@ def recording() -> Recording:
     return Recording.of({"t": t, "tau": tau, "q": q, "q_d": q + 1e-3, "heat": t}, "swing")
 
 
-@pytest.fixture
-def answer(tmp_path: Path) -> DiagnosisResult:
-    (tmp_path / "card.toml").write_text(CARD, "utf-8")
-    card = read_card(tmp_path / "card.toml")
-    return DiagnosisResult(diagnosis("two"), card, card)
-
-
 def is_one_line(thing: object) -> bool:
     return "\n" not in repr(thing) and len(repr(thing)) < 200
 
@@ -135,7 +120,10 @@ def test_a_recording_is_one_line_and_a_figure_with_its_set_point_beside_the_posi
         recording.plot("qq")
 
 
-def test_a_diagnosis_is_one_line_tables_and_a_figure(answer: DiagnosisResult, tmp_path: Path) -> None:
+def test_a_diagnosis_is_one_line_tables_and_a_figure(tmp_path: Path) -> None:
+    (tmp_path / "card.toml").write_text(CARD, "utf-8")
+    card = read_card(tmp_path / "card.toml")
+    answer = DiagnosisResult(diagnosis("two"), card, card)
     assert is_one_line(answer)
     found = answer.frame()
     assert found.iloc[0]["effect"] == "cogging"
@@ -146,28 +134,23 @@ def test_a_diagnosis_is_one_line_tables_and_a_figure(answer: DiagnosisResult, tm
     assert 0 < np.std(held["after"]) < np.std(held["missing"])
     drawn = answer.plot()
     assert [axes.get_xlabel() for axes in drawn.axes] == ["validation RMS error [N·m]", "time [s]"]
-    bars = [bar.get_width() for bar in drawn.axes[0].patches]
-    held_out = answer.diagnosis.heldout
+    bars, held_out = [bar.get_width() for bar in drawn.axes[0].patches], answer.diagnosis.heldout
     assert bars == pytest.approx([held_out.after_rms, held_out.before_rms, held_out.nominal_rms])
     drawn.savefig(tmp_path / "answer.png")
     assert missing_frame(()).empty
 
 
-def test_an_identification_is_one_line_a_table_and_a_figure(recording: Recording, tmp_path: Path) -> None:
+def test_an_identification_and_a_run_are_one_line_a_table_and_a_figure(recording: Recording, tmp_path: Path) -> None:
     (tmp_path / "card.toml").write_text(CARD, "utf-8")
     found = cosim.identify(recording, tmp_path / "card.toml")
-    assert is_one_line(found)
     table = found.frame().set_index("parameter")
     assert table.loc["friction.Fc", "value"] == pytest.approx(2.4, rel=0.1)
     assert table.loc["friction.Fc", "given"] == 2.0
-    drawn = found.plot()
-    assert {axes.get_ylabel() for axes in drawn.axes} == {"friction [N m]"}
-
-
-def test_a_run_is_one_line_and_a_figure() -> None:
+    assert {axes.get_ylabel() for axes in found.plot().axes} == {"friction [N m]"}
     done = cosim.run("sidereal", stop=0.05)
-    assert is_one_line(done)
     assert "time [s]" in {axes.get_xlabel() for axes in done.plot().axes}
+    assert is_one_line(found)
+    assert is_one_line(done)
 
 
 SAME = {
@@ -188,7 +171,9 @@ VERBS = ("run", "diagnose", "export", "show", "sweep", "investigate", "card", "c
 @pytest.mark.parametrize("verb", VERBS)
 def test_command_line_and_python_offer_the_same(verb: str) -> None:
     command: Any = getattr(module_of(verb), verb)
-    options = {SAME.get(verb, {}).get(name, name) for name in inspect.signature(command).parameters}
-    arguments = set(inspect.signature(getattr(cosim, verb)).parameters)
-    assert options - (set(METHODS) - arguments) <= arguments, "on the command line only"
-    assert arguments - PYTHON_ONLY <= options, "in Python only"
+    options = {SAME.get(verb, {}).get(name, name) for name in signature(command).parameters}
+    arguments = signature(getattr(cosim, verb)).parameters
+    assert options - (set(METHODS) - set(arguments)) <= set(arguments), "on the command line only"
+    assert set(arguments) - PYTHON_ONLY <= options, "in Python only"
+    told = arguments.get("on_progress")
+    assert told is None or told.kind is Parameter.KEYWORD_ONLY

@@ -23,20 +23,13 @@ error = { signal = "q_d", minus = "q", kind = "rms", unit = "arcsec" }
 """
 
 
-@pytest.fixture
-def answered(tmp_path: Path) -> Path:
-    folder = tmp_path / "found"
-    folder.mkdir()
-    (folder / "diagnosis.json").write_text(json.dumps(as_json(diagnosis("two")), default=str), "utf-8")
-    (folder / "report.html").write_text("", "utf-8")
-    return folder
-
-
 @pytest.mark.parametrize("name", ["", "diagnosis.json"])
-def test_a_diagnosis_is_shown_from_its_folder_and_its_file(answered: Path, name: str) -> None:
-    shown = cosim.show(answered / name)
+def test_a_diagnosis_is_shown_from_its_folder_and_its_file(tmp_path: Path, name: str) -> None:
+    (tmp_path / "diagnosis.json").write_text(json.dumps(as_json(diagnosis("two")), default=str), "utf-8")
+    (tmp_path / "report.html").write_text("", "utf-8")
+    shown = cosim.show(tmp_path / name)
     assert "cogging" in shown.facts["missing"]
-    assert shown.facts["open"] == str(answered / "report.html")
+    assert shown.facts["open"] == str(tmp_path / "report.html")
     rows = {row["effect"]: row["answer"] for row in shown.tables["effects"]}
     assert rows["cogging"] == "detected"
     assert "not_seen" not in rows.values()
@@ -50,7 +43,9 @@ def test_a_broken_diagnosis_is_one_sentence(tmp_path: Path, text: str) -> None:
     assert "diagnosis.json" in str(refused.value)
 
 
-def test_a_run_is_shown_from_its_folder(tmp_path: Path) -> None:
+def test_a_run_is_shown_from_its_folder_and_a_folder_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(cosim.InputError, match="a folder of a run, diagnosis, sweep"):
+        cosim.show(tmp_path)
     cosim.run("sidereal", tmp_path / "run", stop=0.05, page=False)
     shown = cosim.show(tmp_path / "run")
     assert shown.facts["scenario"] == "sidereal"
@@ -58,21 +53,13 @@ def test_a_run_is_shown_from_its_folder(tmp_path: Path) -> None:
     assert "RMS tracking error" in str(shown.facts["tracking"])
 
 
-def test_a_folder_of_nothing_is_refused_with_what_can_be_shown(tmp_path: Path) -> None:
-    with pytest.raises(cosim.InputError, match="a folder of a run, diagnosis, sweep"):
-        cosim.show(tmp_path)
-
-
-def test_an_fmu_from_the_cache_is_told_by_its_place_in_the_archive(
+def test_an_fmu_is_told_by_its_place_in_the_archive_and_advice_names_packages_that_can_be_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cosim.system.diagram.cache_home", lambda: tmp_path)
     inside = tmp_path / "ssp" / "0123456789abcdef" / "resources" / "theirs.fmu"
     assert origin(ComponentSection(fmu=inside)) == "resources/theirs.fmu"
     assert origin(ComponentSection(fmu=Path("/elsewhere/mine.fmu"))) == "/elsewhere/mine.fmu"
-
-
-def test_advice_names_packages_that_can_be_installed() -> None:
     assert "mount-cosim" not in install("serve")
     assert '"starlette>=' in install("serve")
 
@@ -101,7 +88,9 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_comparison_is_shown_from_its_folder_and_its_file_and_another_file_of_its_name_is_not(tmp_path: Path) -> None:
+def test_a_comparison_and_a_blind_benchmark_are_shown_and_another_file_of_its_name_is_not(
+    tmp_path: Path,
+) -> None:
     t = [0.01 * k for k in range(200)]
     one, other = ({"t": t, "a": [k + shift for k in t], "b": t} for shift in (0.0, 0.25))
     cosim.compare(one, other, out=tmp_path / "over")
@@ -113,9 +102,7 @@ def test_a_comparison_is_shown_from_its_folder_and_its_file_and_another_file_of_
     foreign = tmp_path / "compare.json"
     foreign.write_text(json.dumps([{"t": k, "tau": 1.0, "q": 2.0 * k} for k in t]), "utf-8")
     assert cosim.show(foreign).facts["recording"] == str(foreign)
-
-
-def test_a_blind_benchmark_is_shown_by_its_scores(tmp_path: Path) -> None:
+    foreign.unlink()
     score = {"title": "false alarms", "value": 0.0, "low": 0.0, "high": 0.65761, "n": 2, "asked": "<= 0.02"}
     told = {"played": 2, "cases": 2, "seed": 1, "command": "cosim prove --cases 2", "scores": [score]}
     (tmp_path / "proof.json").write_text(json.dumps(told), "utf-8")
