@@ -51,6 +51,8 @@ static int step(M *m, double t, double h) {
 """
     + TINY[TINY.index("#define API") :]
 )
+TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
+"""The numbers of what is recorded; the FMU states others."""
 Row = tuple[str, str, str, str, str]
 VARIABLES: tuple[Row, ...] = (
     ("i", "input", "A", "0", ""),

@@ -3,84 +3,83 @@
 import json
 import re
 import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from commands import call
 from experiment_archives import bundle, with_files
-from motor_fmu import motor, recorded
+from motor_fmu import TRUTH, motor
 
 import cosim
 from cosim.support.errors import InputError, OutputError, SweepError
 from cosim_calibration.store import Store
 
-TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
+
+@pytest.fixture(scope="session")
+def found(found) -> Callable[..., cosim.CalibrateResult]:
+    """As elsewhere, by two processes from two starts."""
+    return partial(found, starts=2, workers=2)
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory) -> Path:
-    return motor(tmp_path_factory.mktemp("motor"), 3)
-
-
-@pytest.fixture(scope="module")
-def table(fmu) -> dict:
-    return recorded(fmu, TRUTH)
-
-
-@pytest.fixture(scope="module")
-def whole(fmu, table, tmp_path_factory) -> bytes:
+def whole(found, table, tmp_path_factory) -> bytes:
     """What an undisturbed calibration writes."""
     out = tmp_path_factory.mktemp("whole")
-    found(table, fmu=fmu, out=out)
+    found(table, out=out)
     assert not (out / "progress").exists()
     return (out / "identified.json").read_bytes()
 
 
-def found(*given, **options):
-    return cosim.identify(*given, **{"workers": 2, "starts": 2, "free": list(TRUTH), **options})
-
-
-def ended(monkeypatch: pytest.MonkeyPatch, count: int, *given, **options) -> None:
+@pytest.fixture
+def ended(found, monkeypatch) -> Callable[..., None]:
     """A calibration that is ended once some simulations are kept."""
-    put, done = Store.put, []
+    put = Store.put
 
-    def until(self, *arguments):
-        put(self, *arguments)
-        done.append(1)
-        if len(done) == count:
-            raise KeyboardInterrupt
+    def end(count: int, *given, **options) -> None:
+        done = []
 
-    with monkeypatch.context() as patch:
-        patch.setattr(Store, "put", until)
-        with pytest.raises(KeyboardInterrupt):
-            found(*given, **options)
+        def until(self, *arguments):
+            put(self, *arguments)
+            done.append(1)
+            if len(done) == count:
+                raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Store, "put", until)
+            with pytest.raises(KeyboardInterrupt):
+                found(*given, **options)
+
+    return end
 
 
-def test_one_that_was_ended_twice_comes_to_the_same_bits(fmu, table, whole, tmp_path, monkeypatch):
+def test_one_that_was_ended_twice_comes_to_the_same_bits(found, ended, table, whole, tmp_path):
     for count in (5, 30):
-        ended(monkeypatch, count, table, fmu=fmu, out=tmp_path)
+        ended(count, table, out=tmp_path)
         assert not (tmp_path / "identified.json").exists()
     lines = (tmp_path / "progress" / "runs.jsonl").read_bytes().splitlines(keepends=True)
     (tmp_path / "progress" / "runs.jsonl").write_bytes(b"".join(lines[:-1]) + lines[-1][:9])  # as a kill leaves it
     (tmp_path / "progress" / "points" / "000002.npz").write_bytes(b"PK nothing")
     said: list[str] = []
-    found(table, fmu=fmu, out=tmp_path, on_progress=said.append)
+    found(table, out=tmp_path, on_progress=said.append)
     assert "34 simulations were done before" in said
     assert (tmp_path / "identified.json").read_bytes() == whole
     assert not (tmp_path / "progress").exists()
 
 
-def test_what_was_begun_with_other_recordings_is_not_mixed(fmu, table, whole, tmp_path, monkeypatch):
-    ended(monkeypatch, 3, {**table, "w": 2 * table["w"]}, fmu=fmu, out=tmp_path)
+def test_what_was_begun_with_other_recordings_is_not_mixed(found, ended, table, whole, tmp_path):
+    ended(3, {**table, "w": 2 * table["w"]}, out=tmp_path)
     with pytest.raises(OutputError, match="holds another calibration: its recordings changed since"):
-        found(table, fmu=fmu, out=tmp_path)
-    found(table, fmu=fmu, out=tmp_path, force=True)
+        found(table, out=tmp_path)
+    found(table, out=tmp_path, force=True)
     assert (tmp_path / "identified.json").read_bytes() == whole
 
 
-def test_a_cluster_comes_to_the_same_bits_and_a_crash_there_costs_a_point(fmu, table, whole, tmp_path, monkeypatch):
+def test_a_cluster_comes_to_the_same_bits_and_a_crash_there_costs_a_point(
+    fmu, found, table, whole, tmp_path, monkeypatch
+):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
     gone = tmp_path / "motor3.fmu"
@@ -96,10 +95,10 @@ def test_a_cluster_comes_to_the_same_bits_and_a_crash_there_costs_a_point(fmu, t
         found(table, fmu=gone, cluster="nowhere")
 
 
-def test_free_start_values_take_the_noise_of_single_readings_out_of_the_numbers(fmu, table):
+def test_free_start_values_take_the_noise_of_single_readings_out_of_the_numbers(found, table):
     off = {}
     for initial in ("recorded", "free"):
-        done = found(table, fmu=fmu, window=1.0, initial=initial, starts=1)
+        done = found(table, window=1.0, initial=initial, starts=1)
         off[initial] = [(done.numbers[name] - value) / done.standard_errors[name] for name, value in TRUTH.items()]
     assert np.abs(off["free"]).max() < 2.5 < np.abs(off["recorded"]).max()
     told = done.as_json()
@@ -109,46 +108,27 @@ def test_free_start_values_take_the_noise_of_single_readings_out_of_the_numbers(
     assert json.dumps(told)
 
 
-def test_a_recording_that_does_not_begin_at_the_models_start_is_followed_from_a_free_one(fmu, table):
-    later = {name: values[100:] for name, values in table.items()}
-    done = found(later, fmu=fmu, initial="free", starts=1)
+def test_a_recording_that_does_not_begin_at_the_models_start_is_followed_from_a_free_one(found, table):
+    done = found({name: values[100:] for name, values in table.items()}, initial="free", starts=1)
     assert all(abs(done.numbers[name] - value) < 3 * done.standard_errors[name] for name, value in TRUTH.items())
     trace = next(one for one in done.calibrated.traces if one.output == "w")
     assert trace.rms(trace.after) < 0.022
-    with pytest.raises(cosim.InputError, match='--initial "no": there are: recorded, free'):
-        found(later, fmu=fmu, initial="no")
+    long = {name: np.tile(one, 4) for name, one in table.items()} | {"t": 0.01 * np.arange(1600)}
     with pytest.raises(cosim.InputError, match="400 are the most: give longer windows"):
-        found(
-            {name: np.tile(one, 4) if name != "t" else 0.01 * np.arange(1600) for name, one in table.items()},
-            fmu=fmu,
-            window=0.05,
-            initial="free",
-        )
+        found(long, window=0.05, initial="free")
 
 
 # What a calibration or a check wrote is shown again; pages and pictures are in the FMU's own units.
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("again")
-
-
-@pytest.fixture(scope="module")
-def run(folder) -> Path:
-    path = folder / "run.csv"
-    pd.DataFrame(recorded(motor(folder, 3), TRUTH)).to_csv(path, index=False)
-    return path
-
-
-@pytest.fixture(scope="module")
-def numbers(folder, run) -> Path:
-    out = folder / "numbers"
-    cosim.identify(run, fmu=folder / "motor3.fmu", free=[*TRUTH, "idle"], starts=1, workers=1, out=out)
+def numbers(found, table, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("again") / "numbers"
+    found(table, free=[*TRUTH, "idle"], starts=1, out=out)
     return out
 
 
-def test_the_folder_of_a_calibration_is_shown(numbers):
+def test_the_folder_of_a_calibration_is_shown_and_has_a_report(numbers):
     shown = cosim.show(numbers)
     told = json.loads((numbers / "identified.json").read_text())
     first, *_, idle = shown.tables["numbers"]
@@ -157,11 +137,8 @@ def test_the_folder_of_a_calibration_is_shown(numbers):
     assert shown.tables["not determined"] == [{"sentence": "idle changes nothing that was recorded."}]
     assert [row["output"] for row in shown.tables["RMS error of each output"]] == ["w", "phi"]
     assert shown.facts["report"] == str(numbers / "report.html")
-
-
-def test_the_report_says_which_numbers_hang_together_and_keeps_the_units_of_the_fmu(numbers):
+    # The report says which numbers hang together, and keeps the units of the FMU.
     page = (numbers / "report.html").read_text()
-    told = json.loads((numbers / "identified.json").read_text())
     assert abs(told["correlations"]["d"]["Fc"]) > 0.5
     assert f'<td>d</td><td>Fc</td><td class="n">{told["correlations"]["d"]["Fc"]:.3f}'.replace("-", "−") in page
     assert "<td>idle</td><td>idle</td>" not in page
@@ -169,17 +146,17 @@ def test_the_report_says_which_numbers_hang_together_and_keeps_the_units_of_the_
     assert data["recordings"][0]["titles"] == ["w [rad/s]", "difference from measured [rad/s]"]
 
 
-def test_the_folder_of_a_check_is_shown_and_its_picture_has_units(folder, capsys):
+def test_the_folder_of_a_check_is_shown_and_its_picture_has_units(tmp_path, capsys):
     t = 0.01 * np.arange(50)
     made = bundle({"time": t, "i": 0 * t}, {"time": t, "w": 0 * t + 0.5})
-    fmu = with_files(motor(folder, 2), folder / "off.fmu", made)
-    done = cosim.check(fmu, folder / "checked")
-    (row,) = cosim.show(folder / "checked").tables["variables"]
+    fmu = with_files(motor(tmp_path, 2), tmp_path / "off.fmu", made)
+    done = cosim.check(fmu, tmp_path / "checked")
+    (row,) = cosim.show(tmp_path / "checked").tables["variables"]
     assert not done.passed
     assert (row["variable"], row[""], row["largest difference"]) == ("w", "FAIL", "0.5")
-    call("show", folder / "checked")
+    call("show", tmp_path / "checked")
     assert "at [s]" in capsys.readouterr().out, "what stands in brackets is no markup"
-    svg = (folder / "checked" / "experiment_1.svg").read_text()
+    svg = (tmp_path / "checked" / "experiment_1.svg").read_text()
     assert "w [rad/s]" in svg
     assert "difference from reference [rad/s]" in svg
 
@@ -191,18 +168,8 @@ def test_options_of_recordings_are_refused_where_they_would_do_nothing(numbers, 
             cosim.show(what, **option)
 
 
-def test_another_value_of_an_input_that_a_column_feeds_is_refused(folder, run):
-    with pytest.raises(InputError, match='--set i: the column "i" of run feeds it'):
-        cosim.identify(run, fmu=folder / "motor3.fmu", free=["J"], set={"i": 3.0}, workers=1)
-
-
-def test_a_folder_is_no_fmu(folder):
-    with pytest.raises(cosim.CosimError, match="is no FMU: it is a folder"):
-        cosim.check(folder)
-
-
-def test_a_calibration_without_a_model_says_which_options_there_are(run, capsys):
-    assert call("identify", "--free", "J", run) == 2
+def test_a_calibration_without_a_model_says_which_options_there_are(capsys):
+    assert call("identify", "--free", "J", "run.csv") == 2
     assert "One of --card, --fmu and --system" in capsys.readouterr().err
 
 

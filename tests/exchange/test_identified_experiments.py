@@ -6,36 +6,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 from experiment_archives import FOLDER, bundle, manifest, with_files
-from motor_fmu import driven, motor, recorded
+from motor_fmu import driven, recorded
 
 import cosim
+from cosim.data.recording import Recording
+from cosim.delivery.experiment import of_recording, sines, with_experiment
 from cosim.fmi.manifest import manifest_of
 from cosim.fmi.own_starts import MEMBER, as_member, own_starts
 from cosim_calibration.left_behind import MANIFEST, left_behind
+from pyfmi_models.card import read_card
+from pyfmi_models.export import export_fmu
 
 T = 0.01 * np.arange(101)
 
 
 @pytest.fixture(scope="module")
-def carrying(tmp_path_factory) -> Path:
-    """The motor with an experiment that it passes as it is."""
-    folder = tmp_path_factory.mktemp("carrying")
-    fmu, current = motor(folder, 3), 2 * np.sin(9 * T)
-    reference = {"time": T, "w": driven(fmu, current)["w"]}
-    return with_files(fmu, folder / "carrying.fmu", bundle({"time": T, "i": current}, reference))
-
-
-@pytest.fixture(scope="module")
-def identified(carrying, tmp_path_factory) -> Path:
-    """The motor with a page beside its experiment, identified from one run and judged on another."""
-    folder = tmp_path_factory.mktemp("identified")
+def identified(fmu, tmp_path_factory) -> Path:
+    """The motor with an experiment that it passes and a page, identified from one run and judged on another."""
+    folder, current = tmp_path_factory.mktemp("identified"), 2 * np.sin(9 * T)
+    files = bundle({"time": T, "i": current}, {"time": T, "w": driven(fmu, current)["w"]})
     rows = ("application/x-ma-hs-experiments", "a.exp", "experiment"), ("text/html", "page.html", "document")
     more = {"page.html": "<p/>", "fmi-ls-manifest.xml": manifest(*rows)}
-    with zipfile.ZipFile(carrying) as archive:
-        kept = {one: archive.read(one) for one in archive.namelist() if not one.endswith("fmi-ls-manifest.xml")}
-    archive_of(folder / "plain.fmu", kept).close()
-    with_page = with_files(folder / "plain.fmu", folder / "theirs.fmu", more)
-    runs = [recorded(carrying, {"J": 0.03, "Fc": 0.16}, rows=150, seed=seed) for seed in (1, 2)]
+    with_page = with_files(fmu, folder / "theirs.fmu", files | more)
+    runs = [recorded(fmu, {"J": 0.03, "Fc": 0.16}, rows=150, seed=seed) for seed in (1, 2)]
     given = {"J": 0.02, "Fc": 0.16}  # Fc stays, and is not the start value that the FMU states
     done = cosim.identify(
         runs[0], heldout=runs[1], fmu=with_page, free=["J"], set=given, starts=1, workers=1, out=folder / "numbers"
@@ -92,23 +85,59 @@ def archive_of(path: Path, files: dict[str, str | bytes]) -> zipfile.ZipFile:
 
 def test_other_files_stay_and_no_source_reaches_beyond_the_folder(tmp_path):
     """An experiment that names the description as its reference does not take it away."""
-    folder = MANIFEST.rpartition("/")[0]
-    entries = [
+    text = manifest(
         ("application/x-ma-hs-experiments", "a.exp", "experiment/smoke-test"),
         ("text/html", "b.html", "document"),
-    ]
-    text = manifest(*entries, ("text/csv", "r.csv", "result"), ("text/csv", "s.csv", "other"))
+        ("text/csv", "r.csv", "result"),
+        ("text/csv", "s.csv", "other"),
+    )
     inside = '<Experiments><Stimuli source="s.csv"/><References source="../../modelDescription.xml"/></Experiments>'
-    files = {MANIFEST: text, f"{folder}/a.exp": inside, f"{folder}/s.csv": "time\n0\n", "modelDescription.xml": "<x/>"}
+    files = {MANIFEST: text, f"{FOLDER}/a.exp": inside, f"{FOLDER}/s.csv": "time\n0\n", "modelDescription.xml": "<x/>"}
     with archive_of(tmp_path / "some.zip", files) as archive:
         gone, left = left_behind(archive)
-    assert gone == {MANIFEST, *(f"{folder}/{name}" for name in ("a.exp", "r.csv", "s.csv"))}
+    assert gone == {MANIFEST, *(f"{FOLDER}/{name}" for name in ("a.exp", "r.csv", "s.csv"))}
     assert b"b.html" in left
     assert not any(name in left for name in (b"a.exp", b"r.csv", b"s.csv"))
-
-
-def test_an_archive_without_a_manifest_loses_nothing_and_one_that_cannot_be_read_stays(tmp_path):
     with archive_of(tmp_path / "none.zip", {"modelDescription.xml": "<x/>"}) as archive:
         assert left_behind(archive) == (frozenset(), b"")
     with archive_of(tmp_path / "torn.zip", {MANIFEST: "<torn"}) as archive:
-        assert left_behind(archive) == (frozenset(), b"<torn")
+        assert left_behind(archive) == (frozenset(), b"<torn"), "what cannot be read stays"
+
+
+# What this project exports carries an experiment by which it can be checked elsewhere.
+
+
+def test_an_exported_fmu_passes_the_experiment_that_it_carries_and_equal_cards_give_equal_bytes(tmp_path):
+    once, again = (cosim.export("emps", tmp_path / name, fmi=3) for name in ("once", "again"))
+    for path, same in zip(once.fmus, again.fmus, strict=True):
+        assert path.read_bytes() == same.read_bytes()
+        done = cosim.check(path)
+        assert done.passed, str(done)
+        assert done.checked.outcomes[0].compared
+        assert done.checked.standard == "FMI-LS-REF 1.0.0-beta.1"
+
+
+def test_the_torque_of_a_recording_is_the_stimulus_and_what_was_measured_lies_beside(tmp_path):
+    model = read_card("paper_mount").plant().model()
+    t = 1e-3 * np.arange(3000)
+    table = {"t": t, "tau": 20 * np.sin(6 * t), "q": 1e-3 * np.cos(6 * t), "tau_d": t}
+    stimulus = of_recording(Recording("night", table), model)
+    path = tmp_path / "improved.fmu"
+    with_experiment(lambda related: export_fmu(model, path, fmi=3, force=True, related=related), stimulus)
+    done = cosim.check(path)
+    assert done.passed, str(done)
+    assert done.checked.outcomes[0].experiment.name == "night"
+    with zipfile.ZipFile(path) as archive:
+        measured = archive.read(f"{FOLDER}/measured.csv").decode().splitlines()
+        assert measured[0] == "time,q"
+        assert len(measured) == 2001
+        assert "tau" in archive.read(f"{FOLDER}/stimulus.csv").decode().splitlines()[0]
+
+
+def test_an_fmu_without_a_recording_is_asked_for_sines_of_two_seconds():
+    """Also where the model is sampled: ten of its steps lie between two rows."""
+    card = read_card("paper_mount")
+    for model, every in ((card.plant().model(), 0.01), (card.controller_model(), 10 / card.controller.loop_hz)):
+        times = sines(model).times
+        np.testing.assert_allclose(np.diff(times), every)
+        assert (times[0], times[-1]) == (0.0, pytest.approx(2.0))
