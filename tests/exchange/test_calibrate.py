@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from commands import call
 from motor_fmu import TRUTH, driven, motor, recorded
+from small_loop import text_of
 
 import cosim
 from cosim_calibration.calibrate import Options, calibrate
@@ -140,41 +141,30 @@ def test_an_input_without_a_number_in_a_row_is_a_sentence_and_notes_of_the_readi
 
 # A whole scenario: components, signals and wires by their addresses.
 
-SCENARIO = """
-name = "two motors"
-step = 0.01
-stop = 3.0
-[components.first]
-fmu = "motor3.fmu"
-parameters = {{ J = {J} }}
-[components.second]
-fmu = "motor3.fmu"
-parameters = {{ Fc = {Fc} }}
-[signals.current]
-kind = "sine"
-amplitude = 3.0
-frequency = 0.7
-[[connections]]
-from = "current.position"
-to = "first.i"
-unit = "A"
-[[connections]]
-from = "first.w"
-to = "second.i"
-unit = "A"
-gain = {gain}
-[record]
-signals = {{ w = "second.w", phi = "first.phi" }}
-"""
 OF_SYSTEM = {"first.J": 0.03, "second.Fc": 0.2, "second.i.gain": 1.4}
+
+
+def two_motors(inertia: float, friction: float, gain: float) -> str:
+    fmus = {"first": {"J": inertia}, "second": {"Fc": friction}}
+    return text_of(
+        {
+            "first.i": {"from": "current.position", "unit": "A"},
+            "second.i": {"from": "first.w", "unit": "A", "gain": gain},
+        },
+        step=0.01,
+        stop=3.0,
+        components={name: {"fmu": "motor3.fmu", "parameters": given} for name, given in fmus.items()},
+        signals={"current": {"kind": "sine", "amplitude": 3.0, "frequency": 0.7}},
+        record={"signals": {"w": "second.w", "phi": "first.phi"}},
+    )
 
 
 @pytest.fixture(scope="module")
 def scenario(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("system")
     motor(folder, 3)
-    (folder / "start.toml").write_text(SCENARIO.format(J=0.02, Fc=0.1, gain=1.0))
-    (folder / "truth.toml").write_text(SCENARIO.format(J=0.03, Fc=0.2, gain=1.4))
+    (folder / "start.toml").write_text(two_motors(0.02, 0.1, 1.0))
+    (folder / "truth.toml").write_text(two_motors(*OF_SYSTEM.values()))
     table = cosim.run(folder / "truth.toml").recording.table
     random = np.random.default_rng(5)
     noisy = {name: table[name] + 0.02 * random.standard_normal(len(table["t"])) for name in ("w", "phi")}

@@ -2,10 +2,10 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from commands import ENVIRONMENT
 from sweeps import SCENARIO, K, folder, run, written
+from waiting import until
 
 import cosim.sweeps.cluster
 from cosim.support.errors import OutputError, SweepError
@@ -20,25 +21,20 @@ from cosim.support.errors import OutputError, SweepError
 __all__ = ["folder"]
 
 
-def test_a_finished_sweep_is_not_run_again_and_failures_only_when_asked(folder: Path) -> None:
-    path = written(folder, (K, '"plant.k" = [-1.0, 1.0, 2.0]'))
+def test_a_finished_or_killed_sweep_goes_on_where_it_was_and_with_failures_only_when_asked(folder: Path) -> None:
+    path, journal = written(folder, (K, '"plant.k" = [-1.0, 1.0, 2.0]')), folder / "out" / "runs.jsonl"
     first, table = run(path)
     again, same = run(path)
     assert (first.done, again.done, again.found, again.failed) == (9, 0, 9, 3)
     pd.testing.assert_frame_equal(table, same)
     retried, _ = run(path, retry=True)
     assert (retried.done, retried.found, retried.failed) == (3, 6, 3)
-
-
-def test_a_killed_sweep_goes_on_where_it_was(folder: Path) -> None:
-    path = written(folder, (K, '"plant.k" = { low = 1.0, high = 9.0, count = 20 }'))
-    whole, table = run(path)
-    lines = (folder / "out" / "runs.jsonl").read_bytes().splitlines(keepends=True)
-    (whole.table).unlink()
     # What a kill leaves: the lines before, and one that was being written.
-    (folder / "out" / "runs.jsonl").write_bytes(b"".join(lines[:51]) + lines[51][:20])
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:5]) + lines[5][:20])
+    first.table.unlink()
     rest, same = run(path)
-    assert (rest.found, rest.done) == (51, 9)
+    assert (rest.found, rest.done) == (5, 4)
     pd.testing.assert_frame_equal(table.drop(columns="seconds"), same.drop(columns="seconds"))
 
 
@@ -58,22 +54,17 @@ SPOILT: tuple[bytes | Callable[[bytes], bytes], ...] = (
 
 
 @pytest.fixture
-def unrehearsed(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """From now on no process is started before the folder is looked at: what is asked is refused there."""
-
-    def now() -> None:
-        monkeypatch.setattr("cosim.sweeps.conduct.warm", lambda _: None)
-        monkeypatch.setattr("cosim.sweeps.conduct._units", lambda _: {"seconds": "s"})
-
-    return now
-
-
-def test_a_journal_that_another_hand_changed_is_a_sentence_and_stays_as_it_is(
-    folder: Path, unrehearsed: Callable[[], None]
-) -> None:
-    path, journal = written(folder), folder / "out" / "runs.jsonl"
+def made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A finished sweep; what is asked again is refused at its folder, before any process is started."""
+    path = written(folder)
     run(path)
-    unrehearsed()
+    monkeypatch.setattr("cosim.sweeps.conduct.warm", lambda _: None)
+    monkeypatch.setattr("cosim.sweeps.conduct._units", lambda _: {"seconds": "s"})
+    return path
+
+
+def test_a_journal_that_another_hand_changed_is_a_sentence_and_stays_as_it_is(made: Path) -> None:
+    journal = made.parent / "out" / "runs.jsonl"
     lines = sorted(journal.read_bytes().splitlines(), key=lambda line: json.loads(line)["run"])
     for spoilt in SPOILT:
         line = spoilt if isinstance(spoilt, bytes) else spoilt(lines[2])
@@ -81,21 +72,18 @@ def test_a_journal_that_another_hand_changed_is_a_sentence_and_stays_as_it_is(
         journal.write_bytes(b"\n".join([*lines[:2], line, *lines[3:], b""]))
         before = journal.read_bytes()
         with pytest.raises(OutputError, match=r"runs.jsonl: line 3 is no row of a sweep; mend or remove that line"):
-            run(path)
+            run(made)
         assert journal.read_bytes() == before, line[:80]
     journal.write_bytes(b"\n".join([*lines[:2], *lines[3:], b""]))
-    again, _ = run(path)
+    again, _ = run(made)
     assert (again.done, again.found) == (1, 8)
 
 
-def test_an_identity_that_is_no_json_is_a_sentence(folder: Path, unrehearsed: Callable[[], None]) -> None:
-    path, identity = written(folder), folder / "out" / "sweep.json"
-    run(path)
-    unrehearsed()
+def test_an_identity_that_is_no_json_is_a_sentence(made: Path) -> None:
     for spoilt in (b"", b"{", b"[]", b"\xff", b"[" * 100_000):
-        identity.write_bytes(spoilt)
+        (made.parent / "out" / "sweep.json").write_bytes(spoilt)
         with pytest.raises(OutputError, match=r"sweep.json is damaged: it is no JSON; give another --out, or --force"):
-            run(path)
+            run(made)
 
 
 @pytest.fixture
@@ -117,24 +105,17 @@ def started(folder: Path) -> Iterator[Callable[[], "subprocess.Popen[str]"]]:
             process.communicate()
 
 
-def wait_for(path: Path, lines: int) -> None:
-    until = time.monotonic() + 60
-    while time.monotonic() < until and (not path.exists() or path.read_bytes().count(b"\n") < lines):
-        time.sleep(0.05)
-
-
 def children(process: "subprocess.Popen[str]") -> list[int]:
-    found = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True, check=False
-    )
-    return [int(line) for line in found.stdout.split()]
+    found = Path(f"/proc/{process.pid}/task").glob("*/children")
+    return [int(one) for path in found for one in path.read_text().split()]
 
 
-def gone(pids: list[int]) -> bool:
-    until = time.monotonic() + 10
-    while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < until:
-        time.sleep(0.05)
-    return not any(Path(f"/proc/{pid}").exists() for pid in pids)
+def wait_for(path: Path, lines: int) -> None:
+    until(lambda: path.exists() and path.read_bytes().count(b"\n") >= lines)
+
+
+def wait_for_the_end(pids: list[int]) -> None:
+    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids), 10)
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="it looks for processes as Linux shows them")
@@ -149,7 +130,7 @@ def test_kill_9_and_ctrl_c_lose_nothing_that_was_done(
     process.kill()
     process.communicate()
     assert len(workers) == 2
-    assert gone(workers)  # they see their parent's end
+    wait_for_the_end(workers)  # they see their parent's end
     before = journal.read_bytes().count(b"\n")
     process = started()
     wait_for(journal, before + 5)
@@ -159,7 +140,7 @@ def test_kill_9_and_ctrl_c_lose_nothing_that_was_done(
     assert process.returncode == 130
     assert said.endswith("the same command goes on from there\ncosim: interrupted\n")
     assert "Traceback" not in said
-    assert gone(workers)
+    wait_for_the_end(workers)
     table = pd.read_parquet(folder / "out" / "table.parquet")
     assert table["run"].is_unique
     assert len(table) >= before + 5
@@ -167,32 +148,24 @@ def test_kill_9_and_ctrl_c_lose_nothing_that_was_done(
 
 
 @pytest.mark.parametrize(
-    ("change", "named"),
+    ("file", "change", "named"),
     [
-        (lambda folder: written(folder, ("low = 0.5", "low = 0.6")), "sweep file"),
-        (
-            lambda folder: (folder / "loop.toml").write_text((folder / "loop.toml").read_text() + "decimation = 2\n"),
-            "scenario",
-        ),
+        ("sweep.toml", lambda text: text.replace(b"low = 0.5", b"low = 0.6"), "sweep file"),
+        ("loop.toml", lambda text: text + b"decimation = 2\n", "scenario"),
+        ("tiny.fmu", lambda text: text + b"more", "file of components.plant"),
     ],
 )
-def test_a_folder_of_another_sweep_is_refused(folder: Path, change: Callable[[Path], object], named: str) -> None:
+def test_a_folder_of_another_sweep_is_refused(
+    folder: Path, tiny: dict[int, Path], file: str, change: Callable[[bytes], bytes], named: str
+) -> None:
+    shutil.copy(tiny[3], folder / "tiny.fmu")
+    (folder / "loop.toml").write_text(SCENARIO.replace("{fmu}", "tiny.fmu"))
     run(folder / "sweep.toml")
-    change(folder)
+    (folder / file).write_bytes(change((folder / file).read_bytes()))
     rule = f"out holds another sweep: its {named} changed since; give another --out, or --force to start over."
     with pytest.raises(OutputError, match=re.escape(rule)):
         run(folder / "sweep.toml")
     assert run(folder / "sweep.toml", force=True)[0].done == 9
-
-
-def test_a_changed_fmu_makes_it_another_sweep(folder: Path, tiny: dict[int, Path]) -> None:
-    path = folder / "tiny.fmu"
-    path.write_bytes(tiny[3].read_bytes())
-    (folder / "loop.toml").write_text(SCENARIO.replace("{fmu}", "tiny.fmu"))
-    run(folder / "sweep.toml")
-    path.write_bytes(tiny[2].read_bytes())
-    with pytest.raises(OutputError, match=r"its file of components.plant changed since"):
-        run(folder / "sweep.toml")
 
 
 def test_force_removes_what_a_sweep_made_and_nothing_else(folder: Path) -> None:
