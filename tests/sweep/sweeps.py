@@ -8,7 +8,7 @@ import pytest
 
 from cosim.sweeps.conduct import Summary, conduct
 from cosim.sweeps.file import read_sweep
-from cosim.system.scenario import Scenario, read_scenario
+from cosim.system.scenario import read_scenario
 
 SCENARIO = """
 step = 1e-3
@@ -61,9 +61,5 @@ def written(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def run(path: Path, **settings: Any) -> tuple[Summary, pd.DataFrame]:
     sweep = read_sweep(path)
-    done = conduct(sweep, scenario_of(path), path.parent / "out", **({"workers": 1} | settings))
+    done = conduct(sweep, read_scenario(sweep.scenario), path.parent / "out", **({"workers": 1} | settings))
     return done, pd.read_parquet(done.table)
-
-
-def scenario_of(path: Path) -> Scenario:
-    return read_scenario(read_sweep(path).scenario)
