@@ -15,7 +15,6 @@ import cosim
 from cosim.api.diagnose import check_split
 from cosim.data.recording import Recording
 from cosim.support.plugins import HANDLES, names
-from pyfmi_models.friction import LuGre
 
 FUNCTIONS = ("diagnose", "export", "identify", "read", "run", "show")
 CARD = """
@@ -26,6 +25,13 @@ model = "coulomb"
 Fc = 2.5
 """
 SCENARIO = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.2")
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Path:
+    path = tmp_path / "axis.toml"
+    path.write_text(CARD, "utf-8")
+    return path
 
 
 def table(rows: int = 400) -> dict[str, np.ndarray]:
@@ -76,11 +82,7 @@ def test_a_file_a_data_frame_and_arrays_are_the_same_recording(tmp_path: Path) -
     for other in found[1:]:
         assert other.columns == found[0].columns
         assert all(np.array_equal(other[name], found[0][name]) for name in other)
-
-
-def test_a_recording_is_returned_as_it_is() -> None:
-    recording = cosim.read(table())
-    assert cosim.read(recording) is recording
+    assert cosim.read(found[0]) is found[0]
 
 
 def test_columns_and_units_of_a_table_are_mapped_as_those_of_a_file() -> None:
@@ -126,27 +128,23 @@ def test_a_run_gives_its_recording_and_tells_itself(tmp_path: Path) -> None:
         cosim.run(path, tmp_path / "out", page=False)
 
 
-def test_a_card_is_exported_from_a_file_or_as_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "axis.toml"
-    path.write_text(CARD, "utf-8")
-    one = cosim.export(path, tmp_path / "a", fmi=3)
-    other = cosim.export(cosim.read_card(path), tmp_path / "b", fmi=3)
+def test_a_card_is_exported_from_a_file_or_as_it_is(card: Path, tmp_path: Path) -> None:
+    one = cosim.export(card, tmp_path / "a", fmi=3)
+    other = cosim.export(cosim.read_card(card), tmp_path / "b", fmi=3)
     assert [one.fmus[0].name] == [other.fmus[0].name] == ["axis_plant_fmi3.fmu"]
     assert one.fmus[0].read_bytes() == other.fmus[0].read_bytes()
     assert "axis_plant_fmi3.fmu" in str(one)
     assert "axis_plant_fmi3.fmu" in one._repr_html_()
 
 
-def test_numbers_are_identified_from_a_table_in_memory(tmp_path: Path) -> None:
+def test_numbers_are_identified_from_a_table_in_memory(card: Path) -> None:
     t = np.arange(2000) * 0.005
     v = 0.5 * np.sin(2 * np.pi * 0.3 * t)
     q = np.cumsum(v) * 0.005
-    law = LuGre(Fc=2.0, Fs=2.5, Vs=0.01, sigma0=1e4, sigma1=100.0, sigma2=3.0)
     tau = 2.0 * np.sign(v) + 3.0 * v + 30.0 * np.gradient(v, t)
-    path = tmp_path / "axis.toml"
-    path.write_text(CARD.replace("2.5", "2.5\nsigma2 = 1.0"), "utf-8")
-    found = cosim.identify({"t": t, "tau": tau, "q": q}, path)
-    assert float(law.Fc) == pytest.approx(found.identified.map.fits["both"].values[0], rel=0.1)  # type: ignore[union-attr]
+    card.write_text(CARD.replace("2.5", "2.5\nsigma2 = 1.0"), "utf-8")
+    found = cosim.identify({"t": t, "tau": tau, "q": q}, card)
+    assert found.identified.map.fits["both"].values[0] == pytest.approx(2.0, rel=0.1)  # type: ignore[union-attr]
     assert "Friction map" in str(found)
     assert "Friction map" in found._repr_html_()
     assert set(found.numbers) >= {"axis.inertia", "friction.Fc"}
@@ -161,12 +159,10 @@ def recorded(seconds: float, drag: float, seed: int) -> pd.DataFrame:
     return pd.DataFrame({"t": t, "tau": 30 * np.gradient(v, t) + 2.5 * np.sign(v) + drag * v * abs(v) + noise, "q": q})
 
 
-def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_notebook(tmp_path: Path) -> None:
-    path = tmp_path / "axis.toml"
-    path.write_text(CARD, "utf-8")
+def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_notebook(card: Path) -> None:
     train, heldout = [recorded(30, 4.0, seed) for seed in (1, 2)], recorded(30, 4.0, 3)
     told: list[tuple[str, ...]] = []
-    answer = cosim.diagnose(train, heldout, path, on_answer=lambda found: told.append(found.verdict))
+    answer = cosim.diagnose(train, heldout, card, on_answer=lambda found: told.append(found.verdict))
     assert answer.missing == ("quadratic_drag",)
     assert told == [answer.missing]
     assert [effect.id for effect in answer.card.effects] == ["quadratic_drag"]
@@ -178,22 +174,16 @@ def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_not
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks a folder in which no one can make another")
-def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "axis.toml"
-    path.write_text(CARD, "utf-8")
+def test_a_folder_that_cannot_be_made_is_said_before_the_work(card: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cosim.api.diagnose.find", lambda *_: pytest.fail("the work began"))
     with pytest.raises(cosim.CosimError, match="/proc/none/out cannot be made"):
-        cosim.diagnose(recorded(30, 4.0, 1), recorded(30, 4.0, 2), path, "/proc/none/out")
+        cosim.diagnose(recorded(30, 4.0, 1), recorded(30, 4.0, 2), card, "/proc/none/out")
 
 
-@pytest.mark.parametrize("name", ["sidereal", "paper_mount"])
-def test_what_is_shown_is_text_and_a_page(name: str) -> None:
-    shown = cosim.show(name)
-    assert all(str(value) in str(shown) for value in shown.facts.values())
-    assert "<table>" in shown._repr_html_()
-
-
-def test_a_recording_is_shown_as_its_file_is(tmp_path: Path) -> None:
+def test_what_is_shown_is_text_and_a_page_and_a_recording_as_its_file(tmp_path: Path) -> None:
+    for shown in (cosim.show("sidereal"), cosim.show("paper_mount")):
+        assert all(str(value) in str(shown) for value in shown.facts.values())
+        assert "<table>" in shown._repr_html_()
     recording = cosim.read(table())
     path = recording.write(tmp_path / "one.parquet")
     assert cosim.show(recording).tables == cosim.show(path).tables
