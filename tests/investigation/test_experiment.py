@@ -31,13 +31,22 @@ def night() -> Prepared:
     return prepare([Recording("night", {"t": t, "tau": torque, "q": q})], 30.0)
 
 
-def test_a_chirp_tells_a_lag_from_a_delay_and_nothing_slow_does(night: Prepared) -> None:
-    base = read_card("paper_mount").plant()
-    lag, delay = (replace(base, effects=(one,)) for one in (ActuatorLag(time_constant_ms=5.0), Delay(delay_ms=5.0)))
+def test_a_chirp_tells_a_lag_from_a_delay_in_a_scenario_that_cosim_run_reads(night: Prepared, tmp_path: Path) -> None:
+    """Nothing slow does."""
+    card = read_card("paper_mount")
+    lag, delay = (
+        replace(card.plant(), effects=(one,)) for one in (ActuatorLag(time_constant_ms=5.0), Delay(delay_ms=5.0))
+    )
     found = best(lag, delay, ("actuator_lag", "delay"), night)
     assert found is not None
     assert found.signal.kind in ("chirp", "multisine")
     assert found.difference > 0.05
+    (tmp_path / "next_experiment.toml").write_text(scenario(found, card))
+    read = read_scenario(tmp_path / "next_experiment.toml")
+    assert set(read.records) == {"tau", "q", "q_d"}
+    assert read.stop == 40.0
+    assert in_words(found, True)["scenario"] == "next_experiment.toml"
+    assert "scenario" not in in_words(found, False)
 
 
 def test_what_a_rival_can_imitate_is_no_difference(night: Prepared) -> None:
@@ -56,20 +65,6 @@ def test_motions_stay_where_the_axis_has_been(night: Prepared) -> None:
     for _, signal in motions(found.visited):
         q = found.visited.middle + signal.stream(0.01)(np.arange(4000))[0]
         assert low - 1e-9 <= q.min() <= q.max() <= high + 1e-9
-
-
-def test_the_scenario_is_one_that_cosim_run_reads(night: Prepared, tmp_path: Path) -> None:
-    card = read_card("paper_mount")
-    base = card.plant()
-    pair = (replace(base, effects=(one,)) for one in (ActuatorLag(time_constant_ms=5.0), Delay(delay_ms=5.0)))
-    found = best(*pair, ("actuator_lag", "delay"), night)
-    assert found is not None
-    (tmp_path / "next_experiment.toml").write_text(scenario(found, card))
-    read = read_scenario(tmp_path / "next_experiment.toml")
-    assert set(read.records) == {"tau", "q", "q_d"}
-    assert read.stop == 40.0
-    assert in_words(found, True)["scenario"] == "next_experiment.toml"
-    assert "scenario" not in in_words(found, False)
 
 
 # What counts as new ground: each kind of motion that no recording held, not only places and speeds.
@@ -94,12 +89,9 @@ def test_the_same_motion_again_is_no_new_ground(family: Callable[[Room], Motion]
     assert ground(family, family) == 0.0
 
 
-def test_rests_are_new_ground_where_nothing_rested() -> None:
+def test_rests_and_smaller_strokes_are_new_ground_where_nothing_rested_and_all_were_long() -> None:
     assert ground(stop_and_go, tone, fast_tone) > 0.3
     assert ground(stop_and_go, tone, fast_tone) > ground(fast_tone, tone) + 0.1
-
-
-def test_smaller_strokes_are_new_ground_where_all_were_long() -> None:
     seen = ground(reversal_ladder, slow_sweep, stop_and_go)
     assert seen > ground(reversal_ladder, slow_sweep, stop_and_go, reversal_ladder) == 0.0
     assert np.isclose(ground(reversal_ladder, reversal_ladder, tone), 0.0)
@@ -130,25 +122,20 @@ def lines(budget: float = 60.0) -> list[str]:
     return said
 
 
-def test_stages_count_up_to_the_most_that_the_budget_allows() -> None:
-    told = [re.match(r"stage (\d+) of (?:at most )?(\d+): ", line) for line in lines()]
+def test_stages_count_up_the_best_answer_so_far_stays_and_the_time_to_go_comes_down() -> None:
+    said = lines()
+    told = [re.match(r"stage (\d+) of (?:at most )?(\d+): ", line) for line in said]
     numbers, most = zip(*[(int(one[1]), int(one[2])) for one in told if one], strict=True)
     assert list(numbers) == sorted(numbers)
     assert set(most) == {8}  # three rounds: move, diagnose, design; the last ends with its diagnosis
     assert numbers[-1] == 8
-    assert lines()[-1].startswith("stage 8 of 8: ")
+    assert said[-1].startswith("stage 8 of 8: ")
     assert "of at most 17: " in lines(120.0)[0]
-
-
-def test_the_best_answer_so_far_stays_when_a_worse_one_comes() -> None:
-    said = lines()
+    # the best answer, when a worse one comes
     assert "best so far" not in said[0]
     assert "best so far: cogging, validation error 0.8 -> 0.3" in said[6]
     assert "best so far: cogging, delay, validation error 0.8 -> 0.2" in said[-1]
-
-
-def test_the_time_to_go_comes_down_in_later_rounds() -> None:
-    said = lines()
+    # the time to go, in later rounds
     assert "left" not in said[0]
     left = [int(found[1]) for line in said if (found := re.search(r"at most about (\d+) s left", line))]
     assert left[-1] < left[0]

@@ -54,20 +54,19 @@ def test_a_long_stroke_tells_a_cable_from_a_weight_and_a_fast_tone_does_not(prob
     assert chosen.worth == 10.0  # what settles it; of those, the one of most new ground
 
 
-def test_a_doubtful_name_and_a_special_case_are_asked_from_the_general_side(problem: Problem) -> None:
+def test_a_doubtful_name_a_special_case_and_an_effect_not_proven_are_asked_from_the_general_side(
+    problem: Problem,
+) -> None:
     """With the cable a model follows one without it, so the other side alone would never promise anything."""
-    for question, other in ((DOUBT, None), (SET, OFFSET(torque=0.1))):  # type: ignore[call-arg]
-        one = duel(problem, question, other)
-        assert one.general == "ours"
+    cable = CABLE_WRAP(stiffness=2.0, home=0.05)  # type: ignore[call-arg]
+    fits = (problem.fit(replace(problem.mount, effects=one), 15) for one in ((), (cable,)))
+    for one, general in (
+        (duel(problem, DOUBT, None), "ours"),
+        (duel(problem, SET, OFFSET(torque=0.1)), "ours"),  # type: ignore[call-arg]
+        (Duel(Question("unproven", ("cable_wrap",), "unproven"), *fits), "other"),
+    ):
+        assert one.general == general
         assert nats(rated(problem, one))["slow sweep"] > 10.0
-
-
-def test_what_needs_columns_of_a_neighbour_is_shown_by_no_motion(problem: Problem) -> None:
-    ours = problem.fit(problem.mount, 5)
-    motion = fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False))
-    piece, _ = piece_of(motion, 0.0, problem.prepared.cutoff, LIMITS)
-    names = ("axis_coupling", "compliance")
-    assert shown_by_motion(names, ours, [piece], 0.1) == {"compliance"}
 
 
 def test_a_motion_that_tells_less_than_a_set_asks_for_is_not_run() -> None:
@@ -79,24 +78,16 @@ def test_a_motion_that_tells_less_than_a_set_asks_for_is_not_run() -> None:
     assert np.isclose(Plan(still, (30.0, 4.0), 0.0).worth, 14.0)
 
 
-def test_what_could_not_be_tested_is_shown_before_new_ground_is_sought(problem: Problem) -> None:
-    fast = fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False))
-    slow = slow_sweep(room_of(LIMITS, 0.0, 12.0, 1, False))
+def test_what_could_not_be_tested_is_shown_before_new_ground_is_sought_if_a_motion_can(problem: Problem) -> None:
+    """What needs columns of a neighbour is shown by no motion."""
+    room = room_of(LIMITS, 0.0, 12.0, 1, False)
+    fast, slow = fast_tone(room), slow_sweep(room)
     assert best([Plan(fast, (), 0.9, 0), Plan(slow, (), 0.2, 1)], False) == Plan(slow, (), 0.2, 1)
-    ours = problem.fit(problem.mount, 5)
-    names = ("axis_coupling", "compliance")
-    found = plans(room_of(LIMITS, 0.0, 12.0, 1, False), problem, ours, [], LIMITS, 0.0, names)
+    ours, names = problem.fit(problem.mount, 5), ("axis_coupling", "compliance")
+    piece, _ = piece_of(fast, 0.0, problem.prepared.cutoff, LIMITS)
+    assert shown_by_motion(names, ours, [piece], 0.1) == {"compliance"}
+    found = plans(room, problem, ours, [], LIMITS, 0.0, names)
     assert {one.motion.family: one.shows for one in found.plans}["fast tone"] == 1
-
-
-def test_an_effect_that_is_not_proven_is_asked_with_it(problem: Problem) -> None:
-    """A model with the cable follows one without it: what shows if there is one is what counts."""
-    without, cable = problem.mount, CABLE_WRAP(stiffness=2.0, home=0.05)  # type: ignore[call-arg]
-    question = Question("unproven", ("cable_wrap",), "unproven")
-    fits = (problem.fit(replace(without, effects=one), 15) for one in ((), (cable,)))
-    one = Duel(question, *fits)
-    assert one.general == "other"
-    assert nats(rated(problem, one))["slow sweep"] > 10.0
 
 
 def test_what_a_model_may_lack_grows_beyond_what_was_recorded(problem: Problem) -> None:

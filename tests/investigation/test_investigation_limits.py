@@ -1,5 +1,6 @@
 """Limits and budget of an investigation hold before anything moves, for a scenario's own motion and on a drive."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,24 +17,29 @@ from cosim_investigation.families import FAMILIES
 from cosim_investigation.investigate import investigate
 from cosim_investigation.limits import LARGEST, SMALLEST, Limits, frequency_of
 from cosim_investigation.motions import room_of
-from cosim_investigation.verb import seconds_of
 
 ABSURD = ("inf", "-inf", "nan", "1e308", "1e-300", "1e999", "-1", "0", "", "1:2:3", "x")
 
 
-@pytest.mark.parametrize("name", ["speed", "acceleration", "torque", "frequency"])
-@pytest.mark.parametrize("text", ABSURD)
-def test_a_limit_is_a_finite_number_that_an_axis_can_have(tmp_path: Path, name: str, text: str) -> None:
-    given = written(tmp_path)
-    with pytest.raises(InputError, match=rf"--limits {name}={text}: (a limit is|its ends)"):
-        investigate(*given[:2], tmp_path / "out", limits={name: text})
-    assert not (tmp_path / "out").exists()
+ENDS = ("-inf:inf", "-1:inf", "nan:1", "0:1e-300", "-1e308:1e308", "1", ":")
 
 
-@pytest.mark.parametrize("text", ["-inf:inf", "-1:inf", "nan:1", "0:1e-300", "-1e308:1e308", "1", ":"])
-@pytest.mark.parametrize("name", ["position", "forbidden"])
-def test_so_are_both_ends_of_a_range(tmp_path: Path, name: str, text: str) -> None:
-    with pytest.raises(InputError, match=rf"--limits {name}={text}: "):
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        *product(("speed", "acceleration", "torque", "frequency"), ABSURD, ["(a limit is|its ends)"]),
+        *product(("position", "forbidden"), ENDS, [""]),
+        ("position", "1:2", ".*stands at 0"),
+        ("position", "2:1", "a limit is position=LOW:HIGH"),
+        ("jerk", "3", "a limit is position=LOW:HIGH"),
+        ("speed", "-1", ".*above 0"),
+        ("frequency", "250", ".*shows less than 250 Hz"),
+    ],
+)
+def test_limits_that_an_axis_cannot_have_are_refused_before_anything_moves(
+    tmp_path: Path, name: str, text: str, said: str
+) -> None:
+    with pytest.raises(InputError, match=rf"--limits {name}={text}: {said}"):
         investigate(*written(tmp_path)[:2], tmp_path / "out", limits={name: text})
     assert not (tmp_path / "out").exists()
 
@@ -63,25 +69,25 @@ def test_a_tone_that_no_motion_is_long_enough_for_is_refused(tmp_path: Path) -> 
         investigate(*written(tmp_path)[:2], tmp_path / "out", limits={"frequency": "1e-9"})
 
 
-def test_the_own_motion_counts_in_the_budget_for_as_long_as_it_lasts(tmp_path: Path) -> None:
-    given, out = written(tmp_path), tmp_path / "out"
-    with pytest.raises(InputError, match=r"the first two motions last 20 s, 12 s of them the set point of axis"):
-        investigate(*given[:2], out, budget=17, seconds=8)
-    assert not [*out.rglob("*.parquet")]
-
-
-@pytest.mark.parametrize("budget", [float("inf"), float("nan"), 0.0, -1.0])
-def test_a_budget_is_a_finite_time(tmp_path: Path, budget: float) -> None:
-    with pytest.raises(InputError, match="it is a time above 0"):
-        investigate(*written(tmp_path)[:2], tmp_path / "out", budget=budget)
-    with pytest.raises(InputError, match="it is a time above 0"):
-        seconds_of("9" * 400)
-
-
-@pytest.mark.parametrize("seconds", [7.9, float("nan"), float("inf"), 1e9, -8.0])
-def test_a_motion_lasts_neither_too_short_nor_for_ever(tmp_path: Path, seconds: float) -> None:
-    with pytest.raises(InputError, match="a motion lasts from 8 to 3600 s"):
-        investigate(*written(tmp_path)[:2], tmp_path / "out", seconds=seconds)
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"budget": 17, "seconds": 8}, "the first two motions last 20 s, 12 s of them the set point of axis"),
+        ({"budget": 5, "seconds": 10}, "--budget 5s: the first two motions last 22 s, 12 s of them the set point"),
+        *[({"budget": budget}, "it is a time above 0") for budget in (np.inf, np.nan, 0.0, -1.0)],
+        *[
+            ({"seconds": one}, "a motion lasts from 8 to 3600 s")
+            for one in (7.9, float("nan"), float("inf"), 1e9, -8.0)
+        ],
+    ],
+)
+def test_times_are_finite_and_the_own_motion_counts_in_the_budget_before_anything_moves(
+    tmp_path: Path, asked: dict[str, float], said: str
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=said):
+        investigate(*written(tmp_path)[:2], out, **asked)
+    assert not [*out.rglob("*.*")]
 
 
 def test_a_first_motion_on_a_drive_is_asked_for_the_torque_that_the_card_says(tmp_path: Path) -> None:
