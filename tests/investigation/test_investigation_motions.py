@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,10 +17,6 @@ from cosim_investigation.motions import FADE, Motion, Rest, Room, Tones, room_of
 
 SIZES = st.floats(1e-3, 10.0)
 LIMITS = Limits(-1.0, 1.0, 0.5, 2.0, 50.0, 5.0)
-
-
-def rooms(limits: Limits) -> list[Room]:
-    return [room_of(limits, home, 12.0, 3, turned) for home in (0.0, 0.8) for turned in (False, True)]
 
 
 @settings(deadline=None)
@@ -60,7 +57,8 @@ def test_a_forbidden_band_that_is_none_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("number", range(len(FAMILIES)))
 def test_a_motion_lasts_as_long_as_asked_begins_and_ends_at_rest_and_is_smooth(number: int) -> None:
-    for room in rooms(LIMITS):
+    for home, turned in product((0.0, 0.8), (False, True)):
+        room = room_of(LIMITS, home, 12.0, 3, turned)
         motion = FAMILIES[number](room)
         t = np.arange(0.0, motion.seconds, 1e-3)
         q, v, a = motion.sampled(t)
@@ -114,21 +112,15 @@ def test_a_recording_that_overshoots_is_named() -> None:
     assert LIMITS.with_given({"speed": "1.4", "position": "-1.4:1.4"}).left_in(recording) == ""
     still = Recording.of({"t": t, "tau": 60 * np.sin(t), "q": 0.4 * np.sin(t)})
     assert LIMITS.left_in(still).startswith("torque")
-
-
-def test_a_gap_of_late_cycles_is_no_speed() -> None:
-    t = np.delete(np.arange(0.0, 10.0, 2e-3), np.arange(2000, 2040))
-    assert LIMITS.left_in(Recording.of({"t": t, "tau": np.sin(t), "q": 0.45 * np.sin(t)})) == ""
-    fast = Recording.of({"t": t, "tau": np.sin(t), "q": 0.2 * np.sin(3 * t)})
+    late = np.delete(np.arange(0.0, 10.0, 2e-3), np.arange(2000, 2040))  # a gap of late cycles is no speed
+    assert LIMITS.left_in(Recording.of({"t": late, "tau": np.sin(late), "q": 0.45 * np.sin(late)})) == ""
+    fast = Recording.of({"t": late, "tau": np.sin(late), "q": 0.2 * np.sin(3 * late)})
     assert LIMITS.left_in(fast).startswith("speed 0.6")
 
 
-def test_the_other_end_comes_first_in_a_turned_motion() -> None:
-    straight, turned = (room_of(LIMITS, 0.0, 12.0, 3, way) for way in (False, True))
-    ways = [FAMILIES[0](room).sampled(np.arange(0.0, 12.0, 1e-2))[0] for room in (straight, turned)]
-    assert np.allclose(ways[0], -ways[1])
-
-
-def test_without_a_forbidden_band_a_tone_has_the_frequency_that_is_wanted() -> None:
+def test_the_other_end_comes_first_in_a_turned_motion_and_a_tone_has_the_frequency_that_is_wanted() -> None:
+    straight, turned = (FAMILIES[0](room_of(LIMITS, 0.0, 12.0, 3, way)) for way in (False, True))
+    t = np.arange(0.0, 12.0, 1e-2)
+    assert np.allclose(straight.sampled(t)[0], -turned.sampled(t)[0])
     room = Room(0.0, 1.0, 2.0, 3.0, 4.0, 30.0, 1)
     assert [room.outside(hertz) for hertz in (0.01, 0.9, 40.0)] == [0.01, 0.9, 40.0]

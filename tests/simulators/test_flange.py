@@ -119,15 +119,6 @@ def test_with_free_flanges_it_is_the_causal_plant(card: str) -> None:
         assert found[f"der(plant.{in_modelica(model, state.name)})"] == pytest.approx(rate, rel=1e-9, abs=1e-12)
 
 
-def test_the_file_is_a_package_of_its_own_beside_the_causal_one(tmp_path: Path) -> None:
-    done = export("emps", tmp_path, fmi=3, modelica=True, modelica_flange=True)
-    assert done.flange == tmp_path / "EmpsFlange.mo"
-    text = done.flange.read_text()
-    assert "Modelica.Mechanics.Translational.Interfaces.Flange_a" in text
-    assert text.rstrip().endswith("end EmpsFlange;")
-    assert 'uses(Modelica(version = "4.0.0"))' in text
-
-
 def test_a_model_without_a_torque_from_outside_has_no_flange(tmp_path: Path) -> None:
     controller = read_card("paper_mount").controller_model()
     with pytest.raises(ExportError, match="disturbance"):
@@ -143,4 +134,10 @@ def test_what_has_the_equations_of_the_fmu_loses_nothing_and_is_in_the_table(tmp
     said = done.as_json()
     assert Path(str(said["c"])).is_dir()
     assert Path(str(said["modelica_flange"])).is_file()
+    linear = export("emps", tmp_path, fmi=3, modelica=True, modelica_flange=True)
+    assert linear.flange == tmp_path / "EmpsFlange.mo"  # a package of its own, beside the causal one
+    text = linear.flange.read_text()
+    assert "Modelica.Mechanics.Translational.Interfaces.Flange_a" in text
+    assert text.rstrip().endswith("end EmpsFlange;")
+    assert 'uses(Modelica(version = "4.0.0"))' in text
     assert "equations of the FMU" in (tmp_path / "altaz_altitude_simulators.txt").read_text()

@@ -7,19 +7,89 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import call
-from joint_loops import PERIOD, apart, in_fmu, in_mujoco
+from nested_runs import InFmpy
 
 from cosim.api.export import export
+from cosim.estimation.filters import lowpass
 from cosim_simulators import FORMATS
 from cosim_simulators.measure import Held, hold
-from cosim_simulators.motion import along_default
+from cosim_simulators.motion import PERIODS, along_default, top_speed
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.compliance import LoadSideCompliance
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
+from pyfmi_models.export import export_fmu
 from pyfmi_models.mount import Mount
+
+PERIOD, SECONDS = 1e-3, 8.0
+"""Of the loop, and how long it runs [s]."""
+HERTZ = 8.0
+"""Bandwidth of the position loop [Hz]."""
+
+
+def asked(mount: Mount) -> np.ndarray:
+    """Set point, its speed and acceleration: (3, rows)."""
+    t, top = np.arange(0, SECONDS, PERIOD), top_speed(mount)
+    rise = np.clip(t / 1.0, 0, 1)
+    rise = rise**3 * (10 - 15 * rise + 6 * rise**2)
+    q = rise * sum(top / 2 * period / (2 * np.pi) * np.sin(2 * np.pi * t / period) for period in PERIODS)
+    v = np.gradient(q, PERIOD)
+    return np.array([q, v, np.gradient(v, PERIOD)])
+
+
+class Loop:
+    """PD with acceleration ahead; the torque is held for one period."""
+
+    def __init__(self, mount: Mount) -> None:
+        omega = 2 * np.pi * HERTZ
+        self.inertia = float(mount.axis.inertia)
+        self.kp, self.kd = omega**2, 2 * 0.7 * omega
+        self.last = 0.0
+
+    def torque(self, want: np.ndarray, q: float) -> float:
+        v, self.last = (q - self.last) / PERIOD, q
+        return self.inertia * (want[2] + self.kp * (want[0] - q) + self.kd * (want[1] - v))
+
+
+def in_fmu(mount: Mount, folder: Path) -> np.ndarray:
+    """Torque and position in each period: (rows, 2)."""
+    path = folder / "plant.fmu"
+    export_fmu(mount.model(), path, fmi=3, force=True)
+    fmu, loop, rows = InFmpy(path, PERIOD), Loop(mount), []
+    fmu.start()
+    for k, want in enumerate(asked(mount).T):
+        (q,) = fmu.get(["q"])
+        rows.append((loop.torque(want, q), q))
+        fmu.set({"tau": rows[-1][0]})
+        fmu.fmu.doStep(k * PERIOD, PERIOD)
+    return np.array(rows)
+
+
+def in_mujoco(mount: Mount, text: str) -> np.ndarray:
+    """The same in MuJoCo, whose steps divide the period."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    steps = round(PERIOD / model.opt.timestep)
+    loop, rows = Loop(mount), []
+    mujoco.mj_forward(model, data)
+    for want in asked(mount).T:
+        q = float(data.sensor("q").data[0])
+        rows.append((loop.torque(want, q), q))
+        data.ctrl[0] = rows[-1][0]
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+    return np.array(rows)
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> tuple[float, float]:
+    """RMS difference of the torque below 30 Hz, and RMS of the torque itself, after 1 s [N m]."""
+    first, second = (lowpass(rows[:, 0].copy(), PERIOD, 30.0)[1000:-200] for rows in (one, other))
+    return float(np.sqrt(np.mean((first - second) ** 2))), float(np.sqrt(np.mean(first**2)))
+
 
 LOADS = (
     Cogging(cycles_per_rev=240, amplitude=0.5, phase=0.4),
@@ -54,7 +124,6 @@ def held_by(simulator: str, plant: Mount) -> tuple[Held, str]:
 )
 def test_what_mujoco_holds_moves_as_the_fmu(plant: Mount, share: float, tmp_path: Path) -> None:
     """`share`: of the torque; MuJoCo's dry friction creeps, and its contact is of first order in the time step."""
-    pytest.importorskip("mujoco")
     held, text = held_by("mujoco", plant)
     assert held.lost == pytest.approx(0, abs=1e-9)
     difference, size = apart(in_fmu(plant, tmp_path), in_mujoco(plant, text))
@@ -63,7 +132,6 @@ def test_what_mujoco_holds_moves_as_the_fmu(plant: Mount, share: float, tmp_path
 
 def test_what_mujoco_loses_in_a_loop_is_what_the_table_says(tmp_path: Path) -> None:
     """Friction by direction becomes one law and a constant; the table measures that along another motion as fast."""
-    pytest.importorskip("mujoco")
     plant = read_card("paper_mount_directional").plant()
     held, text = held_by("mujoco", plant)
     difference, _ = apart(in_fmu(plant, tmp_path), in_mujoco(plant, text))
@@ -142,7 +210,7 @@ def test_isaac_text_is_usd_with_friction_per_degree(tmp_path: Path) -> None:
     assert numbers["viscousFrictionCoefficient"] == pytest.approx(law.sigma2 * np.pi / 180)
 
 
-def test_the_command_writes_files_and_a_table_and_overwrites_nothing(
+def test_the_command_writes_files_and_a_table_overwrites_nothing_and_needs_its_recording(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = ["export", "paper_mount", "--fmi", "3", "--mujoco", "--urdf", "--isaac", "--json", "--out", str(tmp_path)]
@@ -154,10 +222,7 @@ def test_the_command_writes_files_and_a_table_and_overwrites_nothing(
     assert [one["simulator"] for one in told["held"]] == ["mujoco", "urdf", "isaac"]
     assert call(*asked) == 2
     assert "exists already" in capsys.readouterr().err
-
-
-def test_a_recording_that_is_none_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["export", "paper_mount", "--urdf", "--recording", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o")]
+    asked = ["export", "paper_mount", "--urdf", "--recording", "none.csv", "--out", str(tmp_path / "o")]
     assert call(*asked) == 2
     assert "none.csv" in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
