@@ -57,6 +57,7 @@ def saw(x: Array) -> Array:
 LAWS = {
     "bump": lambda x: 0.7 * np.exp(-(((x - 0.3) / 0.12) ** 2)),
     "sine": lambda x: 0.4 * np.sin(2 * np.pi * (x - 0.1) / 0.37),
+    "sine of many periods": lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14),
     "exponential": lambda x: 0.2 * np.exp(x / 0.4),
     "cube": lambda x: 0.9 * x**3,
     "tanh": lambda x: 0.5 * np.tanh(x / 0.08),
@@ -99,7 +100,7 @@ def forms(formula: Formula) -> set[str]:
 @pytest.mark.parametrize("name", LAWS)
 def test_the_right_form_is_found_with_its_numbers_in_their_ranges(name: str) -> None:
     formula = found(name)
-    assert name in forms(formula)
+    assert name.split()[0] in forms(formula)
     x = np.linspace(-0.75, 0.95, 200)
     told, true = formula.value([x]), LAWS[name](x)
     np.testing.assert_allclose(told - told.mean(), true - true.mean(), atol=0.03)
@@ -120,11 +121,6 @@ def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
     assert forms(formula) == {"line"}
     k1, k2, k3 = formula.coefficients  # of x, x y, y
     assert (-k1 / k2, -k3 / k2, k2) == pytest.approx((18.0, 0.3, 0.05), rel=0.05)
-
-
-def test_a_sine_of_many_periods_is_found() -> None:
-    formula = proposed(*case_of(POSITION, lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14)))
-    assert formula.inner[1] == pytest.approx(0.14, rel=0.01)
 
 
 def test_what_fades_after_a_reversal_has_its_time() -> None:
