@@ -1,5 +1,6 @@
 """Limits and budget of an investigation hold before anything moves, for a scenario's own motion and on a drive."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from cosim.support.errors import HardwareError, InputError
 from cosim_investigation.drive import thinned
 from cosim_investigation.families import FAMILIES
 from cosim_investigation.investigate import investigate
-from cosim_investigation.limits import LARGEST, SMALLEST, Limits, frequency_of
+from cosim_investigation.limits import KEPT, LARGEST, SMALLEST, Limits, frequency_of
 from cosim_investigation.motions import room_of
 
 ABSURD = ("inf", "-inf", "nan", "1e308", "1e-300", "1e999", "-1", "0", "", "1:2:3", "x")
@@ -62,6 +63,18 @@ def test_the_own_motion_of_a_scenario_is_asked_for_every_limit_before_it_runs(
     with pytest.raises(InputError, match=f"The first motion, the set point of axis, would leave a limit: {said}"):
         investigate(*given[:2], out, machine=given[2], limits=limits, seconds=10)
     assert not [*out.rglob("*.parquet")]
+
+
+def test_what_a_set_point_visits_and_what_motions_before_strayed_narrow_the_limits() -> None:
+    t = np.arange(0.0, 10.0, 1e-3)
+    motion = (0.3 + 0.2 * np.sin(t), 0.2 * np.cos(t), -0.2 * np.sin(t))
+    visited = Limits.visited(motion, 5.0, None)
+    assert (visited.low, visited.high) == pytest.approx((0.3 - 0.2 / KEPT, 0.3 + 0.2 / KEPT), rel=1e-5)
+    assert (visited.speed, visited.acceleration) == pytest.approx((0.2 / KEPT, 0.2 / KEPT), rel=1e-5)
+    assert visited.frequency == pytest.approx(10 / (2 * np.pi), rel=1e-5)  # ten times that of its own motion
+    assert visited.less(0.01, 0.02) == replace(
+        visited, low=visited.low + 0.01, high=visited.high - 0.01, speed=visited.speed - 0.02
+    )
 
 
 def test_a_tone_that_no_motion_is_long_enough_for_is_refused(tmp_path: Path) -> None:
