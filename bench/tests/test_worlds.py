@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mutants_forks import OURS
+from mutants_choice import PRODUCT
 
 from bench.worlds.machines import assess, cases, plant
 from bench.worlds.machines.compose import compose
@@ -40,7 +40,7 @@ def test_generator_imports_nothing_of_the_project():
                 modules |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 modules.add(node.module.split(".")[0])
-    assert not modules & set(OURS)
+    assert not modules & set(PRODUCT)
 
 
 def test_every_effect_of_the_catalogue_can_be_concealed():
