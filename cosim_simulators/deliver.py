@@ -12,7 +12,6 @@ from cosim_simulators import FORMATS, WHOLE
 from cosim_simulators.format import Format
 from cosim_simulators.measure import Held, hold
 from cosim_simulators.motion import along_default, along_recording
-from cosim_simulators.table import table_text
 from pyfmi_models.card import Card
 from pyfmi_models.mount import Mount
 
@@ -42,7 +41,7 @@ class Planned:
         title = f"Written by mount-cosim from {self.origin}; what is lost is in {self.table.name}"
         for one, (form, path) in zip(held, self.files, strict=False):
             _write(path, form.text(one.mount, self.mount, title), force)
-        _write(self.table, table_text(held), force)
+        _write(self.table, "\n\n".join(map(str, held)) + "\n", force)
         return held
 
 

@@ -54,6 +54,16 @@ class Held:
             return None
         return self.held_error / self.card_error
 
+    def __str__(self) -> str:
+        """The table of what is held and what is lost, RMS along the motion."""
+        cells = [("part", "in the file as", f"lost [{self.unit}]", ""), *(_cells(row) for row in self.rows)]
+        cells.append(
+            ("all together", "", f"{self.lost:.3g}", f"of {self.needed:.3g} {self.unit} that the motion needs")
+        )
+        widths = [max(len(row[k]) for row in cells) for k in range(3)]
+        lines = [f"{a:<{widths[0]}}  {b:<{widths[1]}}  {c:>{widths[2]}}  {d}".rstrip() for a, b, c, d in cells]
+        return "\n".join([f"{self.format.title}, RMS along {self.motion}", *lines, *_errors(self)])
+
     def as_json(self) -> JsonObject:
         """Return everything as plain data."""
         return {
@@ -67,6 +77,18 @@ class Held:
             "held_error": self.held_error,
             "ratio": self.ratio,
         }
+
+
+def _cells(row: Row) -> tuple[str, str, str, str]:
+    lost = "?" if row.lost is None else "0" if row.lost == 0 else f"{row.lost:.3g}"
+    return row.part, row.where or "not held", lost, row.note
+
+
+def _errors(held: Held) -> list[str]:
+    if held.card_error is None or held.held_error is None or held.ratio is None:
+        return []
+    card, file = f"{held.card_error:.3g}", f"{held.held_error:.3g} {held.unit}"
+    return [f"RMS error on the recording: FMU {card}, this file {file} ({held.ratio - 1:+.1%})"]
 
 
 def hold(mount: Mount, form: Format, compared: Compared) -> Held:

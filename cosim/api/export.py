@@ -26,7 +26,7 @@ Progress = Callable[[int, int], None]
 
 
 class Held(Protocol):
-    """What a simulator holds of a card and what it loses; `as_json` has the word of the simulator as "simulator"."""
+    """What a simulator holds of a card and what it loses: a table as text; `as_json` names the simulator."""
 
     def as_json(self) -> JsonObject:
         """Return everything as plain data."""
@@ -79,7 +79,7 @@ class Exported:
 
     def __str__(self) -> str:
         paths = "\n".join(map(str, self.paths))
-        return f"{paths}\n\n{self.table.read_text('utf-8')}".rstrip() if self.table else paths
+        return "\n\n".join([paths, *map(str, self.held)])
 
     def _repr_html_(self) -> str:
         return html_table("Exported", [{"file": path, "bytes": f"{path.stat().st_size:,}"} for path in self.paths])

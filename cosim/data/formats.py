@@ -60,7 +60,7 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     here = partial(read_text, stated=stated) if reader is read_text else reader
 
     def read(path: Path) -> Columns:
-        columns = apart.read_apart(path, suffix, reader) if _is_apart(reader) else here(path)
+        columns = here(path) if reader in _HERE else apart.read_apart(path, suffix, reader)
         return in_columns(path, parted(path, columns))
 
     with within(allowed_by(path, (layout or {}).get(LIMIT, ""))):
@@ -77,14 +77,11 @@ def is_recording(path: Path) -> bool:
 
 def _reader(suffix: str) -> Callable[..., Columns] | None:
     """What reads files of a suffix: one of ours, or what is plugged in for it."""
-    if suffix in _READERS or suffix.removeprefix(".") not in names(READERS):
-        return _READERS.get(suffix)
-    plugged: Callable[..., Columns] = loaded(READERS, suffix.removeprefix("."))
+    if suffix in _READERS:
+        return _READERS[suffix]
+    name = suffix.removeprefix(".")
+    plugged: Callable[..., Columns] | None = loaded(READERS, name) if name in names(READERS) else None
     return plugged
-
-
-def _is_apart(reader: Callable[..., Columns]) -> bool:
-    return reader in _APART or reader not in _READERS.values()
 
 
 def _what_to_do(path: Path, suffix: str) -> str:
@@ -143,5 +140,5 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".asc": read_text,
     ".lvm": read_text,
 }
-_APART = (hdf5.read, matlab.read)
-"""Those by libraries that may crash or hang on a damaged file, as may what is plugged in."""
+_HERE = (read_text, json_records.read, parquet.read, numpy_files.read)
+"""Those that cannot crash or hang on a damaged file; others, as what is plugged in, have a process of their own."""
