@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_unpacked, short
 from cosim_readers.messages import Message, columns_of
+from cosim_readers.package import package
 
 
 def read(path: Path) -> Columns:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_unpacked, listed, short
 from cosim.support.errors import RecordingError
+from cosim_readers.package import package
 
 ARITHMETIC, LONGEST = frozenset("0123456789.eEXx+-*/(), \t"), 200
 """Signs of numbers, of the channel itself and of four operations, and how many a formula may have."""

@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
 from cosim.data.limits import allowance, check_text, is_late, over_time
 from cosim.support.errors import RecordingError
 from cosim_readers.messages import Message, columns_of
+from cosim_readers.package import package
 
 LINE = "=" * 80
 TABLES = ("topics", "messages", "message_definitions")

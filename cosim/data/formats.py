@@ -1,14 +1,14 @@
 """File formats of recordings: bytes to named columns, nothing judged yet.
 
-Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, and what is plugged in
-(`cosim.support.plugins`): MDF4, MCAP and bags of ROS 1 and 2. Units come along where a file states them; see `Columns`.
+Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, and what is plugged in (`cosim.support.plugins`): MAT,
+HDF5, MDF4, MCAP and bags of ROS 1 and 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from cosim.data.binary import apart, hdf5, matlab, numpy_files, parquet
+from cosim.data.binary import apart, numpy_files, parquet
 from cosim.data.columns import Columns
 from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
@@ -53,14 +53,12 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     """
     _check_file(path)
     suffix = suffix_of(path)
-    reader = _reader(suffix)
-    if reader is None:
-        raise RecordingError(f"{path} is {_what_to_do(path, suffix)}", culprit=str(path))
+    reader = _reader(path, suffix)
     stated = {key: text for key, text in (layout or {}).items() if key not in (LIMIT, *OF_ROWS)}
     here = partial(read_text, stated=stated) if reader is read_text else reader
 
     def read(path: Path) -> Columns:
-        columns = here(path) if reader in _HERE else apart.read_apart(path, suffix, reader)
+        columns = here(path) if suffix in _READERS else apart.read_apart(path, suffix, reader)
         return in_columns(path, parted(path, columns))
 
     with within(allowed_by(path, (layout or {}).get(LIMIT, ""))):
@@ -75,23 +73,16 @@ def is_recording(path: Path) -> bool:
     return suffix_of(path) in recordings() and path.is_file()
 
 
-def _reader(suffix: str) -> Callable[..., Columns] | None:
-    """What reads files of a suffix: one of ours, or what is plugged in for it."""
+def _reader(path: Path, suffix: str) -> Callable[..., Columns]:
+    """What reads files of a suffix: one of ours, or what is plugged in for it; else say how it becomes one that is."""
     if suffix in _READERS:
         return _READERS[suffix]
-    name = suffix.removeprefix(".")
-    plugged: Callable[..., Columns] | None = loaded(READERS, name) if name in names(READERS) else None
-    return plugged
-
-
-def _what_to_do(path: Path, suffix: str) -> str:
-    """Say what a file is that is not read here, and how it becomes one that is."""
-    told = CONVERTED.get(path.suffix.lower())
-    return (
-        f"{told}."
-        if told
-        else f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(recordings())}."
-    )
+    if (name := suffix.removeprefix(".")) in names(READERS):
+        plugged: Callable[..., Columns] = loaded(READERS, name)
+        return plugged
+    unknown = f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(recordings())}"
+    told = CONVERTED.get(path.suffix.lower(), unknown)
+    raise RecordingError(f"{path} is {told}.", culprit=str(path))
 
 
 def _check_file(path: Path) -> None:
@@ -129,9 +120,6 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".ndjson": json_records.read,
     ".npz": numpy_files.read,
     ".npy": numpy_files.read,
-    ".mat": matlab.read,
-    ".h5": hdf5.read,
-    ".hdf5": hdf5.read,
     ".txt": read_text,
     ".txt.gz": read_text,
     ".tsv": read_text,
@@ -140,5 +128,4 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".asc": read_text,
     ".lvm": read_text,
 }
-_HERE = (read_text, json_records.read, parquet.read, numpy_files.read)
-"""Those that cannot crash or hang on a damaged file; others, as what is plugged in, have a process of their own."""
+"""Those that cannot crash or hang on a damaged file; what is plugged in has a process of its own."""

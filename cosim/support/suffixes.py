@@ -5,7 +5,6 @@ from cosim.support.plugins import READERS, names
 OURS = (
     *(".csv", ".csv.gz", ".tsv", ".txt", ".txt.gz", ".log", ".dat", ".asc", ".lvm"),
     *(".json", ".json.gz", ".jsonl", ".jsonl.gz", ".ndjson", ".parquet", ".npz", ".npy"),
-    *(".mat", ".h5", ".hdf5"),
 )
 
 

@@ -17,7 +17,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data import limits
-from cosim.data.binary import hdf5, matlab, numpy_files, packages
+from cosim.data.binary import numpy_files, packages
 from cosim.data.binary import parquet as parquet_files
 from cosim.data.limits import Allowance, allowed_by, check_cells, check_columns, check_text, check_unpacked, within
 from cosim.data.recording import Recording
@@ -25,6 +25,7 @@ from cosim.data.text import json_records
 from cosim.data.text.reader import read_text
 from cosim.reading import options_of
 from cosim.support.errors import RecordingError
+from cosim_readers import hdf5, matlab
 
 ROWS, COLUMNS = 120, 3
 TABLE = {name: np.linspace(k, k + 1.5, ROWS) for k, name in enumerate(("t", "tau", "q"))}

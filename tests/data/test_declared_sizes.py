@@ -19,10 +19,11 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data import limits
-from cosim.data.binary import apart, hdf5, hdf5_chunks
+from cosim.data.binary import apart
 from cosim.data.recording import Recording
 from cosim.support.cell import Cell
 from cosim.support.errors import MissingPackageError, RecordingError
+from cosim_readers import hdf5, hdf5_chunks
 
 T = np.arange(400) * 1e-2
 AXIS = {"t": T, "tau": np.cos(T), "q": np.sin(T)}

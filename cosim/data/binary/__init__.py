@@ -1,1 +1,1 @@
-"""Binary files of recordings: Parquet, MAT, HDF5, MDF4, MCAP and the bags of ROS 2."""
+"""Binary files of recordings: Parquet, arrays of NumPy, and the process in which plugged-in readers run."""

@@ -1,26 +1,12 @@
-"""Packages that only some formats need, and vectors of equal length out of whatever a file holds."""
+"""Vectors of equal length out of whatever arrays a file holds."""
 
 from collections import Counter
 from collections.abc import Collection
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cosim.data.limits import check_cells, listed
-from cosim.support.errors import MissingPackageError, RecordingError
-from cosim.support.extras import install
-
-
-def package(name: str, extra: str, path: Path) -> Any:
-    """Import a package that an extra of this project brings (MissingPackageError says how to get it)."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        root = name.partition(".")[0]
-        raise MissingPackageError(f"{path} needs the package {root} to be read: {install(extra)}") from error
-
 
 MOST_BESIDE = 100
 """Signals of one table: of two dimensions the longer one is time, as tools for simulation log to arrays."""
@@ -54,15 +40,6 @@ def left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) ->
     lost = [name for name in numeric if name not in kept and f"{name}_1" not in kept]
     shapes = [f"{name} ({' x '.join(map(str, found[name].shape))})" for name in lost]
     return (f"{path.stem}: arrays of other lengths were left out: {listed(tuple(shapes))}.",) if shapes else ()
-
-
-def opaque(path: Path) -> RecordingError:
-    """Refuse a MAT file that holds nothing but objects."""
-    text = (
-        f"{path} holds MATLAB objects (a table, timeseries or Dataset of Simulink), which only MATLAB can open. There, "
-        "save their numbers: writetable, or vectors t, q, tau with save"
-    )
-    return RecordingError(f"{text}.", culprit=str(path))
 
 
 def as_columns(value: np.ndarray) -> np.ndarray:

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.hdf5_chunks import check_chunks, pieces
-from cosim.data.binary.packages import is_table, left_out, opaque, package, vectors
+from cosim.data.binary.packages import is_table, left_out, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns, check_time, short
 from cosim.support.errors import RecordingError
+from cosim_readers.hdf5_chunks import check_chunks, pieces
+from cosim_readers.package import package
 
 INTERNAL, HANDLE = "#", "MATLAB_object_decode"
 """First sign of the groups in which MATLAB keeps its objects, and the attribute of what leads to one."""
@@ -44,6 +45,15 @@ def read(path: Path) -> Columns:
         raise opaque(path)
     units = {names[whole]: text for whole, text in stated.items() if names[whole] in values}
     return Columns(values, units, notes=left_out(path, found, values))
+
+
+def opaque(path: Path) -> RecordingError:
+    """Refuse a MAT file that holds nothing but objects."""
+    text = (
+        f"{path} holds MATLAB objects (a table, timeseries or Dataset of Simulink), which only MATLAB can open. There, "
+        "save their numbers: writetable, or vectors t, q, tau with save"
+    )
+    return RecordingError(f"{text}.", culprit=str(path))
 
 
 def _vectors(path: Path, h5py: Any, file: Any) -> dict[str, Any]:

@@ -11,12 +11,12 @@ from math import prod
 from pathlib import Path
 from typing import IO
 
-from cosim.data.binary import hdf5
 from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.matlab_structs import arrays_of
-from cosim.data.binary.packages import left_out, opaque, vectors
+from cosim.data.binary.packages import left_out, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import allowance, check_cells, check_time, check_unpacked, listed
+from cosim_readers import hdf5
+from cosim_readers.matlab_structs import arrays_of
 
 PACKED = 15
 """Type of an element of MAT 5 that is packed by zlib (miCOMPRESSED)."""
@@ -48,7 +48,7 @@ def read(path: Path) -> Columns:
     found = found.named()
     values = vectors(path, found.arrays)
     if found.objects and not values:
-        raise opaque(path)
+        raise hdf5.opaque(path)
     units = {name: text for name, text in found.units.items() if name in values}
     return Columns(values, units, notes=notes + left_out(path, found.arrays, values))
 
