@@ -8,7 +8,7 @@ import casadi as ca
 
 from pyfmi_models.adrc.compensation import PREFIX as LAW
 from pyfmi_models.adrc.compensation import Source
-from pyfmi_models.adrc.estimate import Estimate, Seen
+from pyfmi_models.adrc.estimate import Estimate, Seen, cut, within
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import (
     Chapter,
@@ -81,7 +81,7 @@ class Adaptation(Estimate):
         """Return the states after this tick and the torque expected now."""
         now = getattr(seen, self.source)
         this, law = with_symbols(self, symbols, now, PREFIX), with_symbols(self.law, symbols, now, LAW)
-        theta, (bristle, before), slopes, chain, packed = _cut(state, 3, 2, 2, 2 * POLES, 6)
+        theta, (bristle, before), slopes, chain, packed = cut(state, 3, 2, 2, 2 * POLES, 6)
         bristle, slopes = _along(_walked(law, (before + now) / 2, period), bristle, slopes, theta)
         torque, phi = _along(_felt(law, now), bristle, slopes, theta)
         chain = _passed(phi, chain, 1 - ca.exp(-symbols["observer_bandwidth"] * period))
@@ -107,8 +107,7 @@ class Adaptation(Estimate):
 
     def _bounded(self, theta: Any, law: LuGre) -> list[Any]:
         factors = [ca.fmax(1 / self.widest, ca.fmin(self.widest, theta[k])) for k in (0, 1)]
-        most = law.level(0)
-        return [*factors, ca.fmax(-most, ca.fmin(most, theta[2]))]
+        return [*factors, within(law.level(0), theta[2])]
 
 
 _CHAIN = tuple((name, k) for name in ("level", "stiffness") for k in range(POLES))
@@ -116,11 +115,6 @@ _CHAIN = tuple((name, k) for name in ("level", "stiffness") for k in range(POLES
 
 def _memory(name: str, text: str, start: float = 0.0) -> Variable:
     return Variable(name=name, unit="1" if name[0] == "P" else "N.m", description=text, start=start)
-
-
-def _cut(state: list[Any], *sizes: int) -> list[list[Any]]:
-    rest = iter(state)
-    return [[next(rest) for _ in range(size)] for size in sizes]
 
 
 def _scaled(law: LuGre, level: Scalar, stiffness: Scalar) -> LuGre:
@@ -159,7 +153,7 @@ def _along(formula: Formula, bristle: Any, slopes: list[Any], theta: list[Any]) 
 def _passed(phi: list[Any], chain: list[Any], share: Scalar) -> list[Any]:
     """Send each regressor through its poles, one after the other."""
     found = []
-    for value, filters in zip(phi, _cut(chain, POLES, POLES), strict=True):
+    for value, filters in zip(phi, cut(chain, POLES, POLES), strict=True):
         for old in filters:
             value = old + share * (value - old)
             found.append(value)

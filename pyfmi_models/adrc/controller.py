@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi as ca
 
-from pyfmi_models.adrc.estimate import Estimate, Seen
+from pyfmi_models.adrc.estimate import Estimate, Seen, cut, within
 from pyfmi_models.adrc.observer import Observer
 from pyfmi_models.adrc.velocity import ObservedVelocity, Velocity
 from pyfmi_models.model import (
@@ -119,7 +119,7 @@ OUTPUTS = (
 
 def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Scalar]) -> tuple[Any, Any]:
     q, q_d, v_d, a_d = ca.vertsplit(u)
-    memory, zeta, noted, *notes = _split(x, [len(part) for part in adrc.states()])
+    memory, zeta, noted, *notes = cut(ca.vertsplit(x), *map(len, adrc.states()))
     started, last, acted, expected = memory
     gains, h = with_symbols(adrc.gains, symbols, v_d), adrc.period
     seen = adrc.observer.update(zeta, (acted - expected) / gains.inertia, q, gains.observer_bandwidth, h)
@@ -130,7 +130,7 @@ def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Scalar]) -> tuple[Any, 
     speed = ca.if_else(started > 0, speed, zeta[1])
     notes, friction = _estimate(adrc, symbols, notes, Seen(zeta[1], v_d, -gains.inertia * zeta[2]))
     wanted = gains.inertia * (a_d + gains.kp * (q_d - q) + gains.kd * (v_d - speed)) + friction
-    tau = _within(gains.torque_limit, wanted - gains.inertia * zeta[2])
+    tau = within(gains.torque_limit, wanted - gains.inertia * zeta[2])
     following = [1, tau, last, friction, *zeta, *noted, *(one for part in notes for one in part)]
     return ca.vertcat(*following), ca.vertcat(tau, friction, *zeta[:3])
 
@@ -140,12 +140,3 @@ def _estimate(adrc: Adrc, symbols: dict[str, Scalar], states: list[Any], seen: S
     parts = zip(adrc.estimates, states, strict=True)
     done = [one.advance(symbols, state, seen, adrc.period) for one, state in parts]
     return [state for state, _ in done], sum((torque for _, torque in done), start=ca.SX(0))
-
-
-def _within(limit: Scalar, value: Scalar) -> Scalar:
-    return ca.fmax(-limit, ca.fmin(limit, value))
-
-
-def _split(x: Any, sizes: list[int]) -> list[list[Any]]:
-    parts = iter(ca.vertsplit(x))
-    return [[next(parts) for _ in range(size)] for size in sizes]

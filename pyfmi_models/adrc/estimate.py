@@ -1,7 +1,10 @@
 """The contract of a torque estimate: what a controller expects to resist before the observer has seen it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+import casadi as ca
 
 from pyfmi_models.model import Chapter, Scalar, Variable
 
@@ -15,6 +18,17 @@ class Seen(NamedTuple):
     observed: Scalar
     reference: Scalar
     residual: Scalar
+
+
+def within(limit: Scalar, value: Scalar) -> Scalar:
+    """The value, held between -limit and limit."""
+    return ca.fmax(-limit, ca.fmin(limit, value))
+
+
+def cut(state: Iterable[Any], *sizes: int) -> list[list[Any]]:
+    """Parts of a list of states, of these sizes."""
+    rest = iter(state)
+    return [[next(rest) for _ in range(size)] for size in sizes]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 import casadi as ca
 
-from pyfmi_models.adrc.estimate import Estimate, Seen
+from pyfmi_models.adrc.estimate import Estimate, Seen, within
 from pyfmi_models.model import Chapter, Scalar, Variable, chapter_of, parameter, parameters_of, with_symbols
 
 PREFIX = "learning"
@@ -55,7 +55,7 @@ class Learning(Estimate):
         clock, *points = state
         learned = gain = this.gain * self.knots / self.ticks * seen.residual
         weights = self._hats(clock - this.lead / period)
-        learned = [_within(this.limit, p + gain * w) for p, w in zip(points, weights, strict=True)]
+        learned = [within(this.limit, p + gain * w) for p, w in zip(points, weights, strict=True)]
         torque = sum(p * w for p, w in zip(points, self._hats(clock), strict=True))
         return [ca.if_else(clock + 1 >= self.ticks, 0, clock + 1), *learned], torque
 
@@ -65,7 +65,3 @@ class Learning(Estimate):
         place = ca.if_else(place < 0, place + self.knots, place)
         first = ca.fmax(0, 1 - place) + ca.fmax(0, place - (self.knots - 1))
         return [first, *(ca.fmax(0, 1 - ca.fabs(place - k)) for k in range(1, self.knots))]
-
-
-def _within(limit: Scalar, value: Scalar) -> Scalar:
-    return ca.fmax(-limit, ca.fmin(limit, value))

@@ -22,6 +22,7 @@ class ActuatorLag(DriveEffect):
     rivals: ClassVar[tuple[str, ...]] = ("delay", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = "a lag takes amplitude away at high frequency; a delay turns phase only"
     action: ClassVar[str] = "Check the bandwidth of the current loop and any torque filter in the drive."
+    says: ClassVar[str] = "The drive builds up its torque slowly, with a time constant of {0.time_constant_ms:.2g} ms."
     time_constant_ms: Scalar = parameter("ms", "Time constant of the torque build-up", low=0.02, high=200)
 
     def states(self) -> tuple[Variable, ...]:
@@ -39,7 +40,3 @@ class ActuatorLag(DriveEffect):
     def response(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
         """`1 / (1 + j omega T)`."""
         return np.asarray(1 / (1 + 1j * omega * self.time_constant_ms * 1e-3))
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The drive builds up its torque slowly, with a time constant of {self.time_constant_ms:.2g} ms."

@@ -38,6 +38,7 @@ class AltitudeInertia(InertiaEffect):
     rivals: ClassVar[tuple[str, ...]] = ("inertia_variation",)
     told_apart_by: ClassVar[str] = "it follows the altitude, not the position of the azimuth axis itself"
     action: ClassVar[str] = "Nothing needs repair: tell the controller the inertia for the altitude."
+    says: ClassVar[str] = "The azimuth carries {0.tube_inertia:.3g} kg·m² more with the tube level than at the zenith."
     tube_inertia: Scalar = parameter("kg.m2", TUBE, low=0)
 
     def inputs(self) -> tuple[Variable, ...]:
@@ -55,10 +56,6 @@ class AltitudeInertia(InertiaEffect):
         """The altitude: its rate makes the torque I sin(2h) h' A'."""
         return {"altitude": "altitude_rate"}
 
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The azimuth carries {self.tube_inertia:.3g} kg·m² more with the tube level than at the zenith."
-
 
 @dataclass(frozen=True, kw_only=True)
 class AzimuthCentrifugal(LoadEffect):
@@ -72,6 +69,7 @@ class AzimuthCentrifugal(LoadEffect):
     rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance",)
     told_apart_by: ClassVar[str] = "it grows with the square of the azimuth rate and is nothing at rest"
     action: ClassVar[str] = "Nothing needs repair: slew one axis after the other where it matters."
+    says: ClassVar[str] = "Turning in azimuth swings the tube down; it weighs {0.tube_inertia:.3g} kg·m² against it."
     tube_inertia: Scalar = parameter("kg.m2", TUBE, low=0)
 
     def inputs(self) -> tuple[Variable, ...]:
@@ -81,7 +79,3 @@ class AzimuthCentrifugal(LoadEffect):
     def load(self, motion: Motion) -> Scalar:
         """`I sin(2h) A'^2 / 2`."""
         return self.tube_inertia * ca.sin(2 * motion.q) * motion.inputs["azimuth_rate"] ** 2 / 2
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"Turning in azimuth swings the tube down; it weighs {self.tube_inertia:.3g} kg·m² against it."

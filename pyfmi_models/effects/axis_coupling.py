@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Main, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion, words
 from pyfmi_models.model import Scalar, Variable, parameter, word
 
 POSITION = Variable(name="neighbour_position", unit="rad", description="Position of the neighbouring axis")
@@ -106,7 +106,7 @@ class AxisCoupling(Neighbouring):
 
     def said(self, unit: str) -> list[str]:
         """Each torque in words."""
-        return [f"{self.inertia:.3g} {unit} per {_angle(unit)}/s² of {self.called}"] if self.inertia else []
+        return [f"{self.inertia:.3g} {unit} per {words(unit)['way']}/s² of {self.called}"] if self.inertia else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class DampedCoupling(AxisCoupling):
 
     def said(self, unit: str) -> list[str]:
         """Each torque in words."""
-        return [*super().said(unit), f"{self.damping:.3g} {unit} per {_angle(unit)}/s of {self.called}"]
+        return [*super().said(unit), f"{self.damping:.3g} {unit} per {words(unit)['way']}/s of {self.called}"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,7 +231,3 @@ class SpaceCoupling(Neighbouring):
         """The largest torque that the eight can give, the root of the sum of their squares."""
         largest = sqrt(sum(float(getattr(self, one)) ** 2 for one in PRODUCTS))
         return [f"a weight of {largest:.3g} {unit} at most that goes with three angles, this axis', {self.called}"]
-
-
-def _angle(unit: str) -> str:
-    return "m" if unit == "N" else "rad"

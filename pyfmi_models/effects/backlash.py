@@ -39,6 +39,7 @@ class Backlash(Coupling):
     rivals: ClassVar[tuple[str, ...]] = ("compliance", "presliding", "friction_asymmetry", "actuator_lag", "delay")
     told_apart_by: ClassVar[str] = "after each reversal the motor runs free over the same distance, at any speed"
     action: ClassVar[str] = "Preload the gear or the nut; check the key and the coupling."
+    says: ClassVar[str] = "There is play of {0.gap_rad:.3g} {way} in the drive."
     gap_rad: Scalar = parameter("rad", "Width of the play", low=0, nominal=1e-3, tunable=False)
     load_share: Scalar = parameter(
         "1", "Share of the inertia behind the play", default=0.5, low=0.01, high=0.99, tunable=False
@@ -111,7 +112,3 @@ class Backlash(Coupling):
         linear = 1 + per_bend * dt - side * pushed * slides
         root = ca.sqrt(linear**2 + 4 * slides * free)
         return side * ca.if_else(linear > 0, 2 * free / (linear + root), (root - linear) / (2 * slides))
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"There is play of {self.gap_rad:.3g} {'m' if unit == 'N' else 'rad'} in the drive."

@@ -62,6 +62,16 @@ class Motion(NamedTuple):
     balance: Balance = Balance()
 
 
+ROTARY = {"way": "rad", "speed": "rad/s", "turn": "turn", "inertia": "inertia"}
+LINEAR = {"way": "m", "speed": "m/s", "turn": "metre", "inertia": "moving mass"}
+"""How sentences call the units and things of either kind of axis."""
+
+
+def words(unit: str) -> dict[str, str]:
+    """The words of the kind of axis whose torque or force has this unit."""
+    return LINEAR if unit == "N" else ROTARY
+
+
 def times(count: float) -> str:
     """How often, in words: "once", "24 times"."""
     return "once" if count == 1 else f"{count:.4g} times"
@@ -110,6 +120,8 @@ class Effect(Part):
     reads an input in the torque path or has a memory that is not linear in its states."""
     ordered: ClassVar[tuple[tuple[str, str, float], ...]] = ()
     """Parameters of which the second is above the first, and the least factor between them that a fit keeps."""
+    says: ClassVar[str] = ""
+    """`statement` where it has one form: `{0.mgl:.3g} {unit}`, with words of `ROTARY` and `LINEAR`."""
 
     def states(self) -> tuple[Variable, ...]:
         """Name the effect's own states."""
@@ -151,7 +163,9 @@ class Effect(Part):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say what the effect with these numbers is, in one plain sentence; `unit` is the torque or force unit."""
-        raise TypeError(f"{type(self).__name__} has no statement")
+        if not self.says:
+            raise TypeError(f"{type(self).__name__} has no statement")
+        return self.says.format(self, unit=unit, **words(unit))
 
 
 @dataclass(frozen=True, kw_only=True)

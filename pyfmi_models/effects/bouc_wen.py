@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Main, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion, words
 from pyfmi_models.model import Scalar, Variable, parameter
 
 SMALL = 1e-3
@@ -67,6 +67,6 @@ class BoucWen(LoadEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        where = "m" if unit == "N" else "rad"
         height = self.torque * (self.A / (self.beta + self.gamma)) ** (1 / self.n)
-        return f"A belt or gear goes round a loop of {height:.3g} {unit} either way, within {self.stroke:.3g} {where}."
+        stroke = f"{self.stroke:.3g} {words(unit)['way']}"
+        return f"A belt or gear goes round a loop of {height:.3g} {unit} either way, within {stroke}."

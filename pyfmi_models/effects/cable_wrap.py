@@ -24,6 +24,7 @@ class CableWrap(LoadEffect):
     told_apart_by: ClassVar[str] = "a cable pulls harder turn after turn; an unbalance repeats once per turn"
     action: ClassVar[str] = "Give the cable more slack, or bring home to the middle of its travel."
     action_linear: ClassVar[str] = "Give the cable chain more slack, or turn it round; look at bellows and hoses."
+    says: ClassVar[str] = "A cable or spring pulls towards {0.home:.3g} {way} with {0.stiffness:.3g} {unit} per {way}."
     stiffness: Scalar = parameter("N.m/rad", "Stiffness at home", low=0)
     home: Scalar = parameter("rad", "Position without torque", default=0.0)
     hardening: Scalar = parameter(
@@ -34,8 +35,3 @@ class CableWrap(LoadEffect):
         """`k x (1 + h x^2)`."""
         x = motion.q - self.home
         return self.stiffness * x * (1 + self.hardening * x * x)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        where = "m" if unit == "N" else "rad"
-        return f"A cable or spring pulls towards {self.home:.3g} {where} with {self.stiffness:.3g} {unit} per {where}."

@@ -8,7 +8,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import LoadEffect, Main, Motion, times
+from pyfmi_models.effects.base import LoadEffect, Main, Motion, times, words
 from pyfmi_models.model import Scalar, parameter, structure
 
 
@@ -46,10 +46,8 @@ class Cogging(LoadEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        per = "metre" if unit == "N" else "turn"
-        return (
-            f"The motor torque ripples {times(self.cycles_per_rev)} per {per}, by {self.amplitude:.3g} {unit} each way."
-        )
+        often = f"{times(self.cycles_per_rev)} per {words(unit)['turn']}"
+        return f"The motor torque ripples {often}, by {self.amplitude:.3g} {unit} each way."
 
 
 def _wave(turn: Scalar, harmonics: tuple[float, ...]) -> Scalar:

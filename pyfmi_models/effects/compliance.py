@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission
+from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission, words
 from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Scalar, parameter
 
@@ -74,8 +74,8 @@ class Compliance(_Compliance, Coupling):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        name = "moving mass" if unit == "N" else "inertia"
-        return f"{percent(self.share())} of the {name} hangs on a spring that rings at {self.resonance_hz:.3g} Hz."
+        hangs = f"{percent(self.share())} of the {words(unit)['inertia']} hangs on a spring"
+        return f"{hangs} that rings at {self.resonance_hz:.3g} Hz."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +94,9 @@ class LoadSideCompliance(_Compliance, Transmission):
     `Compliance`. Reference: Ellis, Control System Design Guide, on resonance.
     """
 
+    says: ClassVar[str] = (
+        "The motor turns the axis through a spring: both ring against each other at {0.resonance_hz:.3g} Hz."
+    )
     resonance_hz: Scalar = parameter(
         "Hz", "Frequency of both masses against each other", low=0.1, high=1e4, tunable=False
     )
@@ -125,7 +128,3 @@ class LoadSideCompliance(_Compliance, Transmission):
         """`1 + J_motor s^2 / (k + d s)`."""
         s = 1j * omega / (2 * pi * self.resonance_hz)
         return np.asarray(1 + s**2 / (self.encoder_share * (1 + 2 * self.damping_ratio * s)))
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The motor turns the axis through a spring: both ring against each other at {self.resonance_hz:.3g} Hz."

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, words
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -37,6 +37,5 @@ class ConcaveViscous(FrictionEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        speed = "m/s" if unit == "N" else "rad/s"
         how = "falls" if self.exponent < 0 else "rises less than the speed"
-        return f"Above {self.thinning_speed:.3g} {speed} viscous friction {how}: the grease thins."
+        return f"Above {self.thinning_speed:.3g} {words(unit)['speed']} viscous friction {how}: the grease thins."

@@ -28,6 +28,9 @@ class DeadBand(DriveEffect):
     rivals: ClassVar[tuple[str, ...]] = ("torque_saturation", "stribeck", "backlash")
     told_apart_by: ClassVar[str] = "torque is missing by the same amount at every large command, whatever the motion"
     action: ClassVar[str] = "Look at the dead time of the bridge and the offset of the current sensor; compensate it."
+    says: ClassVar[str] = (
+        "The drive gives next to nothing for commands below {0.band:.3g} {unit}, and less by that above."
+    )
     band: Scalar = parameter("N.m", "Command below which next to nothing arrives", low=1e-9)
     softness: Scalar = parameter("1", "Width of the edge, as a share of the band", default=0.25, low=0.2, high=2)
 
@@ -35,7 +38,3 @@ class DeadBand(DriveEffect):
         """The equation above."""
         over, under = (soft(side * command - self.band, self.softness * self.band) for side in (1, -1))
         return over - under
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The drive gives next to nothing for commands below {self.band:.3g} {unit}, and less by that above."

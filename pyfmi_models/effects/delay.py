@@ -35,6 +35,7 @@ class Delay(DriveEffect):
         "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"
     )
     action: ClassVar[str] = "No repair: shorten the bus cycle, or use the improved model for tuning."
+    says: ClassVar[str] = "Actuation delay of {0.delay_ms:.2g} ms (drive or bus, not mechanical)."
     delay_ms: Scalar = parameter(
         "ms", "Dead time between commanded and applied torque", low=0.02, high=50, tunable=False
     )
@@ -59,7 +60,3 @@ class Delay(DriveEffect):
     def response(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
         """`exp(-j omega T)`."""
         return np.asarray(np.exp(-1j * omega * self.delay_ms * 1e-3))
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"Actuation delay of {self.delay_ms:.2g} ms (drive or bus, not mechanical)."

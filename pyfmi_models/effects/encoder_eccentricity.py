@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import Main, Motion, SensorEffect, times
+from pyfmi_models.effects.base import Main, Motion, SensorEffect, times, words
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -43,6 +43,5 @@ class EncoderEccentricity(SensorEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        per, size = ("metre", "m") if unit == "N" else ("turn", "rad")
-        often = f"{times(self.cycles_per_rev)} per {per}"
-        return f"The encoder errs by {self.amplitude_rad:.2g} {size} either way, {often}."
+        known, often = words(unit), times(self.cycles_per_rev)
+        return f"The encoder errs by {self.amplitude_rad:.2g} {known['way']} either way, {often} per {known['turn']}."

@@ -24,13 +24,10 @@ class GravityUnbalance(PayloadEffect):
     )
     action: ClassVar[str] = "Balance the axis until it stays where it is left; otherwise use the improved model."
     action_linear: ClassVar[str] = "Look for what hangs on the carriage; otherwise use the improved model."
+    says: ClassVar[str] = "The axis is out of balance by {0.mgl:.3g} {unit}."
     mgl: Scalar = parameter("N.m", "Weight times lever arm", low=0)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
 
     def load(self, motion: Motion) -> Scalar:
         """`mgl sin(angle + phase)`."""
         return self.mgl * ca.sin(motion.angle + self.phase)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The axis is out of balance by {self.mgl:.3g} {unit}."

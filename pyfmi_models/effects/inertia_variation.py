@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import InertiaEffect, Main, Motion, times
+from pyfmi_models.effects.base import InertiaEffect, Main, Motion, times, words
 from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Scalar, parameter
 
@@ -39,6 +39,5 @@ class InertiaVariation(InertiaEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
-        size, often = percent(self.relative_amplitude), times(self.cycles_per_rev)
-        return f"The {name} rises and falls by {size}, {often} per {per}."
+        known, size, often = words(unit), percent(self.relative_amplitude), times(self.cycles_per_rev)
+        return f"The {known['inertia']} rises and falls by {size}, {often} per {known['turn']}."

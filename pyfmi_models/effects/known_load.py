@@ -20,6 +20,7 @@ class KnownLoad(PayloadEffect):
     rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance", "torque_offset")
     told_apart_by: ClassVar[str] = "it follows the load that was recorded; an unbalance follows the position alone"
     action: ClassVar[str] = "Nothing: the load is known."
+    says: ClassVar[str] = "The known load acts with {0.gain:.3g} {unit} of drive torque for each {unit}."
     gain: Scalar = parameter("1", "Drive torque per torque of the load", default=1.0, low=0, high=1e3)
 
     def inputs(self) -> tuple[Variable, ...]:
@@ -29,7 +30,3 @@ class KnownLoad(PayloadEffect):
     def load(self, motion: Motion) -> Scalar:
         """`gain load_torque`."""
         return self.gain * motion.inputs["load_torque"]
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"The known load acts with {self.gain:.3g} {unit} of drive torque for each {unit}."

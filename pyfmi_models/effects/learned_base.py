@@ -44,6 +44,8 @@ FOLLOWED = ("acceleration", "way")
 class LearnedEffect(Effect):
     """What a learned term declares beside its equation."""
 
+    title: ClassVar[str] = "Learned term"
+    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     kind: ClassVar[str]
     """What its values are: torque, friction, drive, ..."""
     filled: ClassVar[str]
@@ -106,9 +108,7 @@ def _free(form: type[LearnedEffect], count: int) -> Any:
 class TableEffect(LearnedEffect):
     """Where a table goes over, what was seen of it, and its waves at a motion."""
 
-    title: ClassVar[str] = "Learned term"
     equation: ClassVar[str] = "Σ c cos(k π x)"
-    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     told_apart_by: ClassVar[str] = "it says what the remaining error correlates with, not its cause"
     action: ClassVar[str] = "Look at the machine where the table is large; trust it only in the range it was seen in."
     over: str = word("Quantity that the table goes over")

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion
+from pyfmi_models.effects.base import DriveEffect, Motion
 from pyfmi_models.effects.learned_base import FOLLOWED, MOST_WAVES, ROWS, Array, LearnedEffect, TableEffect
 from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.effects.shares import percent
@@ -32,9 +32,7 @@ class LearnedDrive(LearnedEffect, DriveEffect):
     """
 
     id: ClassVar[str] = "learned"
-    title: ClassVar[str] = "Learned term"
     equation: ClassVar[str] = "Σ c cos(k π x)"
-    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     told_apart_by: ClassVar[str] = TableEffect.told_apart_by
     action: ClassVar[str] = "Measure what the drive gives at small and at large commands."
     kind: ClassVar[str] = "drive"

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion, MotionEffect
 from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.effects.shares import higher
@@ -22,9 +22,7 @@ class _Memory(LearnedEffect, MotionEffect):
     """Elements that follow the direction of motion, each over a way or a time of its own, from -1 to 1."""
 
     id: ClassVar[str] = "learned"
-    title: ClassVar[str] = "Learned term"
     equation: ClassVar[str] = "Σ c y"
-    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     told_apart_by: ClassVar[str] = "it says what the remaining error remembers, not its cause"
     action: ClassVar[str] = "Look for what is elastic or magnetic and is carried along: belts, seals, cables, iron."
     share: Scalar = parameter("1", "Share of the term that acts", default=1.0, low=0, high=1, fitted=False)

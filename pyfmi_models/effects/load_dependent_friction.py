@@ -31,15 +31,12 @@ class LoadDependentFriction(FrictionEffect):
     told_apart_by: ClassVar[str] = "it follows the load when the load is changed; a rough track stays where it is"
     action: ClassVar[str] = "Balance the axis; a bearing or gear that is loaded less rubs less."
     action_linear: ClassVar[str] = "Relieve the guides; a guide or nut that is loaded less rubs less."
+    says: ClassVar[str] = "Friction rises by {0.coulomb_per_Nm:.2g} {unit} for each {unit} of load on the axis."
     coulomb_per_Nm: Scalar = parameter("1", "Rise of the friction level per N m of load", low=0, high=10)
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """`level + c |payload|`."""
         return level + self.coulomb_per_Nm * ca.fabs(motion.payload)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"Friction rises by {self.coulomb_per_Nm:.2g} {unit} for each {unit} of load on the axis."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +86,10 @@ class GearLoadFriction(LoadScaledFriction):
     rivals: ClassVar[tuple[str, ...]] = ("torque_saturation", "position_friction", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "it takes more of what brakes the axis too; a drive at its limit gives less of that"
     action: ClassVar[str] = "Look at the gear's lubrication, preload and wear; else keep it in the model."
+    says: ClassVar[str] = (
+        "Friction rises by {0.coulomb_per_Nm:.2g} {unit} for each {unit} through the gear, "
+        "to hold a load or to move it."
+    )
     feels_inertia: ClassVar[bool] = True
     coulomb_per_Nm: Scalar = parameter("1", "Rise of the friction level per N m of load", low=0, high=1 - LEAST_LEFT)
     inertia_share: Scalar = parameter("1", "Share of the axis' inertia behind the gear", low=0, high=1, fitted=False)
@@ -103,8 +104,3 @@ class GearLoadFriction(LoadScaledFriction):
         given = motion.payload + self.inertia_share * push + self.friction_share * others + taking * level
         rise = self.coulomb_per_Nm * level / self.at_level
         return level + rise * ca.fabs(given) / ca.fmax(1 - rise * taking * ca.sign(given), LEAST_LEFT)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        rise = f"{self.coulomb_per_Nm:.2g} {unit} for each {unit}"
-        return f"Friction rises by {rise} through the gear, to hold a load or to move it."

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times, words
 from pyfmi_models.effects.shares import higher, percent
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
@@ -37,9 +37,8 @@ class PeriodicFriction(_PositionFriction):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        per = "metre" if unit == "N" else "turn"
-        size = 100 * self.relative_amplitude
-        return f"Friction rises and falls by {percent(size / 100)}, {times(self.cycles_per_rev)} per {per}."
+        often = f"{times(self.cycles_per_rev)} per {words(unit)['turn']}"
+        return f"Friction rises and falls by {percent(self.relative_amplitude)}, {often}."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,10 +68,13 @@ class LocalFriction(_PositionFriction):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        where = "m" if unit == "N" else "rad"
-        size = 100 * self.relative_amplitude
-        span = f"over about {4 * self.width:.2g} {where}"
-        return f"Around {self.q_center:.4g} {where} friction is {higher(size / 100)}, {span}."
+        return around(self.q_center, self.width, higher(self.relative_amplitude), unit)
+
+
+def around(center: float, width: float, changed: str, unit: str) -> str:
+    """Say what friction is at a rough spot."""
+    way = words(unit)["way"]
+    return f"Around {center:.4g} {way} friction is {changed}, over about {4 * width:.2g} {way}."
 
 
 def bump(q: Scalar, center: Scalar, width: Scalar) -> Scalar:

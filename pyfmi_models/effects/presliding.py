@@ -34,17 +34,13 @@ class Presliding(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "dwell_breakaway", "backlash", "compliance")
     told_apart_by: ClassVar[str] = "below break-away the axis springs back when released; with play it does not"
     action: ClassVar[str] = "Nothing needs repair: contacts bend. For fine tracking use the improved model."
+    says: ClassVar[str] = "Before it slides the axis bends like a spring of {0.sigma0:.3g} {unit} per {way}."
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of the contact below break-away", low=1e-6, nominal=1e4)
     sigma1: Scalar = parameter("N.m.s/rad", "Damping of the contact", default=0.0, low=0, nominal=100)
 
     def law(self, law: FrictionLaw) -> FrictionLaw:
         """The law behind bristles of this stiffness."""
         return _Bristled(law=law, bristles=LuGre(sigma0=self.sigma0, sigma1=self.sigma1, Fc=LEAST_LEVEL))
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        where = "m" if unit == "N" else "rad"
-        return f"Before it slides the axis bends like a spring of {self.sigma0:.3g} {unit} per {where}."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,13 +25,9 @@ class QuadraticDrag(LoadEffect):
     told_apart_by: ClassVar[str] = "drag is the same early and late; friction that warms up is not"
     action: ClassVar[str] = "Look at covers, fans and oil that is churned; at high speed use the improved model."
     action_linear: ClassVar[str] = "Look at bellows and covers that pump air; at high speed use the improved model."
+    says: ClassVar[str] = "Drag grows with the square of the speed, {0.coefficient:.3g} {unit} at 1 {speed}."
     coefficient: Scalar = parameter("N.m.s2/rad2", "Torque per square of the speed", low=0)
 
     def load(self, motion: Motion) -> Scalar:
         """`c v |v|`."""
         return self.coefficient * motion.v * ca.fabs(motion.v)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        speed = "m/s" if unit == "N" else "rad/s"
-        return f"Drag grows with the square of the speed, {self.coefficient:.3g} {unit} at 1 {speed}."

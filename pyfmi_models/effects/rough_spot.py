@@ -6,7 +6,7 @@ from typing import ClassVar
 import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, Main, Motion
-from pyfmi_models.effects.position_friction import bump
+from pyfmi_models.effects.position_friction import around, bump
 from pyfmi_models.effects.shares import higher
 from pyfmi_models.model import Scalar, parameter
 
@@ -45,6 +45,5 @@ class RoughSpot(FrictionEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        where = "m" if unit == "N" else "rad"
         sizes = f"{higher(self.forward)} moving forward and {higher(self.backward)} backward"
-        return f"Around {self.q_center:.4g} {where} friction is {sizes}, over about {4 * self.width:.2g} {where}."
+        return around(self.q_center, self.width, sizes, unit)

@@ -23,6 +23,9 @@ class StribeckEffect(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("presliding", "dwell_breakaway")
     told_apart_by: ClassVar[str] = "Stribeck friction is the same leaving and reaching standstill"
     action: ClassVar[str] = "Look at lubrication if slow motion is jerky; otherwise use the improved model."
+    says: ClassVar[str] = (
+        "Below about {0.Vs:.2g} {speed} friction changes with speed, to {0.Fs:.3g} {unit} near standstill."
+    )
     Fs: Scalar = parameter("N.m", "Break-away level at rest", low=1e-9)
     Vs: Scalar = parameter("rad/s", "Speed over which friction falls", low=1e-7, nominal=0.01)
     delta: Scalar = parameter("1", "Shape exponent of the curve", default=2.0, low=0.1, high=5, fitted=False)
@@ -34,10 +37,3 @@ class StribeckEffect(FrictionEffect):
     def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
         """Those of every Stribeck curve."""
         return stribeck_bounds(variable, recorded)
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        speed = "m/s" if unit == "N" else "rad/s"
-        return (
-            f"Below about {self.Vs:.2g} {speed} friction changes with speed, to {self.Fs:.3g} {unit} near standstill."
-        )

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, words
 from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
@@ -150,7 +150,7 @@ class RubbedViscosity(_HeatedViscosity):
 
     def by(self, unit: str) -> str:
         """The way that is rubbed."""
-        return f"per {'m' if unit == 'N' else 'rad'} rubbed"
+        return f"per {words(unit)['way']} rubbed"
 
     def rate(self, motion: Motion) -> Any:
         """`heat |v| - rise / cooling_s`."""

@@ -91,20 +91,14 @@ def compile_shared(sources: dict[str, bytes], name: str, target: str, flags: tup
     library = cache_directory() / "libraries" / key / name
     if not library.exists():
         try:
-            _build(sources, library, target, flags)
+            library.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=library.parent) as folder:  # it appears complete or not at all
+                os.replace(_compile(sources, Path(folder), name, target, flags), library)
         except OSError as error:
             raise ExportError(
                 f"cannot build in {library.parent}: {error}; set MOUNT_COSIM_CACHE to a folder"
             ) from error
     return library
-
-
-def _build(sources: dict[str, bytes], library: Path, target: str, flags: tuple[str, ...]) -> None:
-    """Work in a folder of our own beside the library, so that it appears complete or not at all."""
-    library.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        built = _compile(sources, Path(folder), library.name, target, flags)
-        os.replace(built, library)
 
 
 def _key(sources: dict[str, bytes], name: str, target: str, flags: tuple[str, ...]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.codegen import SHIM, TOLERANCE, generate
-from pyfmi_models.export.templates import rendered
+from pyfmi_models.export.templates import groups_of, rendered
 from pyfmi_models.model import Model
 
 FOLDER = SHIM / "function"
@@ -35,16 +35,13 @@ def c_files(model: Model) -> dict[str, str]:
         "equations": _only(generated.files["equations.c"]),
         "most_steps": generated.most_steps,
         "tolerance": TOLERANCE,
-        "groups": [
-            ("INPUT", "INPUTS", model.inputs),
-            ("PARAMETER", "PARAMETERS", model.parameters),
-            ("STATE", "STATES", model.states),
-            ("OUTPUT", "OUTPUTS", model.outputs),
-        ],
+        "groups": groups_of(model),
     }
     written = {f"{name}.h": "joint.h.j2", f"{name}.c": "joint.c.j2", "main.c": "main.c.j2"}
     fixed = {path.name: path.read_text("utf-8") for path in SHIM.glob("detmath*")}
-    return {file: _render(template, values) for file, template in written.items()} | dict(sorted(fixed.items()))
+    return {file: rendered(FOLDER / template, values) for file, template in written.items()} | dict(
+        sorted(fixed.items())
+    )
 
 
 def export_c(model: Model, folder: Path, *, force: bool = False) -> Path:
@@ -66,7 +63,3 @@ def _only(equations: str) -> str:
     """The functions that a step needs, each with the comment in front of it."""
     functions = re.findall(r"(/\* [^\n]*\*/\nstatic void model_(\w+)\(.*?\n}\n)", equations, re.DOTALL)
     return "\n".join(text for text, role in functions if role in _WHOLE)
-
-
-def _render(name: str, values: dict[str, object]) -> str:
-    return rendered(FOLDER / name, values)

@@ -47,12 +47,11 @@ def fmi2_description(generated: Generated, sources: Iterable[str]) -> bytes:
         group = ET.SubElement(interface, "SourceFiles")
         for name in sources:
             ET.SubElement(group, "File", name=name)
-    _units(root, layout)
-    _log_categories(root)
-    _default_experiment(root, layout)
-    variables = ET.SubElement(root, "ModelVariables")
+    variables = _body(root, layout)
     for row in layout.rows:
-        _variable2(variables, row, layout)
+        head, numbers = _variable(row, layout)
+        numbers |= {} if row.state is None else {"derivative": str(row.state + 1)}
+        ET.SubElement(ET.SubElement(variables, "ScalarVariable", head), "Real", numbers)
     _structure2(root, layout)
     return xml_text(root)
 
@@ -73,12 +72,12 @@ def fmi3_description(generated: Generated) -> bytes:
     ET.SubElement(root, "ModelExchange", {**flags, "needsCompletedIntegratorStep": "false"})
     step = {"fixedInternalStepSize": repr(layout.model.period)} if layout.model.period else {}
     ET.SubElement(root, "CoSimulation", {**flags, "canHandleVariableCommunicationStepSize": "true", **step})
-    _units(root, layout)
-    _log_categories(root)
-    _default_experiment(root, layout)
-    variables = ET.SubElement(root, "ModelVariables")
+    variables = _body(root, layout)
     for row in layout.rows:
-        _variable3(variables, row, layout)
+        head, numbers = _variable(row, layout)
+        ET.SubElement(
+            variables, "Float64", head | numbers | ({} if row.state is None else {"derivative": str(row.state)})
+        )
     _structure3(root, layout)
     return xml_text(root)
 
@@ -114,15 +113,15 @@ def _units(root: ET.Element, layout: Layout) -> None:
                 ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
-def _log_categories(root: ET.Element) -> None:
+def _body(root: ET.Element, layout: Layout) -> ET.Element:
+    """Units, categories of messages and the default experiment; return the element for the variables."""
+    _units(root, layout)
     group = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(group, "Category", name=name, description=text)
-
-
-def _default_experiment(root: ET.Element, layout: Layout) -> None:
     step = repr(layout.model.period or 1e-4)
     ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="1.0", tolerance=repr(TOLERANCE), stepSize=step)
+    return ET.SubElement(root, "ModelVariables")
 
 
 def _role(row: Row, layout: Layout) -> dict[str, str]:
@@ -135,12 +134,12 @@ def _role(row: Row, layout: Layout) -> dict[str, str]:
         "parameter": {"causality": "parameter", "variability": setting, "initial": "exact"},
         "state": {"causality": "local", "variability": changing, "initial": "exact"},
         "rate": {"causality": "local", "variability": "continuous", "initial": "calculated"},
-        "output": {"causality": "output", "variability": changing, "initial": _initial_of_output(layout)},
+        "output": {
+            "causality": "output",
+            "variability": changing,
+            "initial": "exact" if layout.model.period else "calculated",
+        },
     }[row.kind]
-
-
-def _initial_of_output(layout: Layout) -> str:
-    return "exact" if layout.model.period else "calculated"
 
 
 def _numbers(row: Row, role: dict[str, str]) -> dict[str, str]:
@@ -162,21 +161,11 @@ def _size(row: Row) -> float:
     return abs(row.variable.start) or row.variable.nominal if row.kind == "parameter" else row.variable.nominal
 
 
-def _variable2(parent: ET.Element, row: Row, layout: Layout) -> None:
+def _variable(row: Row, layout: Layout) -> tuple[dict[str, str], dict[str, str]]:
+    """What is said of a variable, and of its numbers."""
     role = _role(row, layout)
     head = {"name": row.variable.name, "valueReference": str(row.reference), "description": row.variable.description}
-    element = ET.SubElement(parent, "ScalarVariable", {**head, **role})
-    numbers = _numbers(row, role)
-    if row.state is not None:
-        numbers["derivative"] = str(row.state + 1)
-    ET.SubElement(element, "Real", numbers)
-
-
-def _variable3(parent: ET.Element, row: Row, layout: Layout) -> None:
-    role = _role(row, layout)
-    head = {"name": row.variable.name, "valueReference": str(row.reference), "description": row.variable.description}
-    state = {"derivative": str(row.state)} if row.state is not None else {}
-    ET.SubElement(parent, "Float64", {**head, **role, **_numbers(row, role), **state})
+    return head | role, _numbers(row, role)
 
 
 def _structure(layout: Layout) -> dict[str, list[tuple[Row, Mapping[int, str]]]]:

@@ -3,6 +3,7 @@
 import math
 import re
 from importlib.resources import files
+from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
@@ -22,18 +23,24 @@ _SIGNS = "Torques and forces drive or resist as their descriptions say; speeds a
 def documentation(generated: Generated, platforms: tuple[str, ...]) -> dict[str, bytes]:
     """The files of the folder, name to content."""
     return {
-        "documentation/index.html": _page(generated, platforms).encode(),
+        "documentation/index.html": _page(generated, platforms),
         "documentation/licenses/license.txt": resource("license.txt"),
         "documentation/licenses/fmi-headers.txt": _licence_of_headers().encode(),
     }
 
 
-def _page(generated: Generated, platforms: tuple[str, ...]) -> str:
-    layout = generated.layout
+def page(template: str, **values: Any) -> bytes:
+    """A page from its template in the folder `templates`."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    tables = {title: layout.of(kind) for title, kind in _TABLES.items()}  # type: ignore[arg-type]
     environment.filters["range"] = _range
-    return environment.from_string(resource("index.html.j2").decode()).render(
+    return environment.from_string(resource(template).decode()).render(values).encode()
+
+
+def _page(generated: Generated, platforms: tuple[str, ...]) -> bytes:
+    layout = generated.layout
+    tables = {title: layout.of(kind) for title, kind in _TABLES.items()}  # type: ignore[arg-type]
+    return page(
+        "index.html.j2",
         model=layout.model,
         figure=Markup(diagram(layout.model)),
         prose=lambda text: Markup(prose(text)),

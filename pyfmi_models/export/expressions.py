@@ -200,27 +200,9 @@ def _operation(node: Node) -> str:
 
 
 _ZERO, _TWO, _THREE = (Node(ca.OP_CONST, value=value) for value in (0.0, 2.0, 3.0))
-_FUNCTIONS = {
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_FABS: "abs",
-    ca.OP_SIGN: "sign",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_FMIN: "min",
-    ca.OP_FMAX: "max",
-}
+_NAMED = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt sign floor ceil"
+_FUNCTIONS = {getattr(ca, f"OP_{name.upper()}"): name for name in _NAMED.split()}
+_FUNCTIONS |= {ca.OP_FABS: "abs", ca.OP_FMIN: "min", ca.OP_FMAX: "max"}
 _INFIX = {
     ca.OP_ADD: ("+", SUM, SUM, SUM),
     ca.OP_SUB: ("-", SUM, SUM, PRODUCT),

@@ -14,7 +14,7 @@ from pyfmi_models.export.codegen import SHIM, generate
 from pyfmi_models.export.description import version_text
 from pyfmi_models.export.objects import Footprint, footprint
 from pyfmi_models.export.platforms import PLATFORMS, host
-from pyfmi_models.export.templates import rendered
+from pyfmi_models.export.templates import groups_of, rendered
 from pyfmi_models.model import Model
 
 FOLDER = SHIM / "firmware"
@@ -122,12 +122,7 @@ def _names(model: Model, encoder: str, quantum: float, command: str) -> dict[str
         "encoder": inputs[encoder],
         "quantum": quantum,
         "command": command,
-        "groups": [
-            ("INPUT", "INPUTS", model.inputs),
-            ("PARAMETER", "PARAMETERS", model.parameters),
-            ("STATE", "STATES", model.states),
-            ("OUTPUT", "OUTPUTS", model.outputs),
-        ],
+        "groups": groups_of(model),
     }
 
 

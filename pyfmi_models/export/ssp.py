@@ -9,15 +9,13 @@ import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Literal
-
-from jinja2 import Environment, StrictUndefined
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.archive import export_fmu, write_zip
 from pyfmi_models.export.description import xml_text
+from pyfmi_models.export.documentation import page
 from pyfmi_models.export.related import Related, identified
 from pyfmi_models.export.srmd import metadata
 from pyfmi_models.export.units import BASE, parse_unit
@@ -231,7 +229,5 @@ def _parameters(model: Model | Archive) -> bytes:
 
 
 def _page(system: System) -> bytes:
-    template = (files("pyfmi_models.export") / "templates" / "ssp.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     delays = [(connection, system.delay(connection)) for connection in system.connections]
-    return environment.from_string(template).render(system=system, delays=delays).encode()
+    return page("ssp.html.j2", system=system, delays=delays)

@@ -69,6 +69,17 @@ class FrictionLaw(Part):
         return ""
 
 
+class GreasedLaw(FrictionLaw):
+    """A law with a viscous torque that is proportional to speed: its `Fc` and `sigma2` enter linearly."""
+
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
+    sigma2: Scalar
+
+    def viscous(self, v: Scalar) -> Scalar:
+        """`sigma2 v`."""
+        return self.sigma2 * v
+
+
 @dataclass(frozen=True, kw_only=True)
 class MemorylessLaw(FrictionLaw):
     """A law whose contact torque follows the speed at once: level times a steep, smooth sign of v."""

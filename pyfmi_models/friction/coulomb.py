@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.friction.base import MemorylessLaw
+from pyfmi_models.friction.base import GreasedLaw, MemorylessLaw
 from pyfmi_models.model import Scalar, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coulomb(MemorylessLaw):
+class Coulomb(GreasedLaw, MemorylessLaw):
     """Constant level against the direction of motion, and a torque proportional to speed.
 
         F(v) = Fc sign(v) + sigma2 v
@@ -17,17 +17,12 @@ class Coulomb(MemorylessLaw):
     """
 
     key: ClassVar[str] = "coulomb"
-    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     Fc: Scalar = parameter("N.m", "Coulomb friction level", low=0)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
 
     def level(self, v: Scalar) -> Scalar:
         """`Fc`."""
         return self.Fc
-
-    def viscous(self, v: Scalar) -> Scalar:
-        """`sigma2 v`."""
-        return self.sigma2 * v
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.friction.base import FrictionLaw
+from pyfmi_models.friction.base import GreasedLaw
 from pyfmi_models.friction.coulomb import Coulomb
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -14,7 +14,7 @@ FLOOR = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dahl(FrictionLaw):
+class Dahl(GreasedLaw):
     """Elastic at first, softer towards the level, where it slides.
 
         dF/dt = sigma0 v sign(u) |u|^n,   u = 1 - F sign(v) / Fc        tau_f = F + sigma2 v
@@ -25,7 +25,6 @@ class Dahl(FrictionLaw):
     """
 
     key: ClassVar[str] = "dahl"
-    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     rivals: ClassVar[tuple[str, ...]] = ("lugre", "maxwell_slip")
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of the contact at zero torque", low=1e-6, nominal=1e4)
     Fc: Scalar = parameter("N.m", "Friction level in sliding", low=1e-9)
@@ -41,10 +40,6 @@ class Dahl(FrictionLaw):
     def level(self, v: Scalar) -> Scalar:
         """`Fc`."""
         return self.Fc
-
-    def viscous(self, v: Scalar) -> Scalar:
-        """`sigma2 v`."""
-        return self.sigma2 * v
 
     def _power(self, u: Scalar) -> Scalar:
         """`|u|^(n - 1)`; below `FLOOR` it stays finite, and so do its derivatives."""

@@ -5,13 +5,13 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.friction.base import FrictionLaw, each_way, stribeck_level
-from pyfmi_models.friction.stribeck import Stribeck
-from pyfmi_models.model import Scalar, Variable, parameter
+from pyfmi_models.friction.base import each_way
+from pyfmi_models.friction.stribeck import StribeckContact
+from pyfmi_models.model import Scalar, Variable
 
 
 @dataclass(frozen=True, kw_only=True)
-class LuGre(FrictionLaw):
+class LuGre(StribeckContact):
     """Bristle friction: elastic before break-away, Stribeck's curve in steady sliding.
 
         dz/dt = v - sigma0 |v| z / g(v),   g(v) = Fc + (Fs - Fc) exp(-|v/Vs|^delta)
@@ -26,27 +26,11 @@ class LuGre(FrictionLaw):
     """
 
     key: ClassVar[str] = "lugre"
-    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     rivals: ClassVar[tuple[str, ...]] = ("maxwell_slip",)
-    sigma0: Scalar = parameter("N.m/rad", "Bristle stiffness", low=1e-6, nominal=1e4)
-    sigma1: Scalar = parameter("N.m.s/rad", "Bristle damping", default=0.0, low=0, nominal=100)
-    sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
-    Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=1e-9)
-    Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=1e-9)
-    Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
-    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5, fitted=False)
 
     def states(self) -> tuple[Variable, ...]:
         """One state: the bristle torque sigma0 z."""
         return (Variable(name="bristle", unit="N.m", description="Bristle torque sigma0 z", nominal=1.0),)
-
-    def level(self, v: Scalar) -> Scalar:
-        """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
-        return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
-
-    def viscous(self, v: Scalar) -> Scalar:
-        """`sigma2 v`."""
-        return self.sigma2 * v
 
     def _deflection_rate(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         return v - ca.fabs(v) * state / level
@@ -66,10 +50,6 @@ class LuGre(FrictionLaw):
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         """`sigma0 z + sigma1 dz/dt`."""
         return state + self.sigma1 * self._deflection_rate(state, v, level)
-
-    def steady(self) -> Stribeck:
-        """Return the law's own steady sliding map (dz/dt = 0)."""
-        return Stribeck(Fc=self.Fc, Fs=self.Fs, Vs=self.Vs, delta=self.delta, sigma2=self.sigma2)
 
     def broken_passivity(self) -> str:
         """Say where sigma2 < sigma1 (Fs - Fc) / Fc, in either direction."""

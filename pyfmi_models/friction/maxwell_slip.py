@@ -6,13 +6,13 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.friction.base import FrictionLaw, each_way, stribeck_level
-from pyfmi_models.friction.stribeck import Stribeck
+from pyfmi_models.friction.base import each_way
+from pyfmi_models.friction.stribeck import StribeckContact
 from pyfmi_models.model import Scalar, Variable, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class MaxwellSlip(FrictionLaw):
+class MaxwellSlip(StribeckContact):
     """N elements share the Stribeck level g(v); each is a spring that slips at its part of it.
 
         dF_i/dt = k_i v tanh(attraction (1 - F_i sign(v) / (g(v) / N)))
@@ -32,18 +32,12 @@ class MaxwellSlip(FrictionLaw):
     """
 
     key: ClassVar[str] = "maxwell_slip"
-    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     rivals: ClassVar[tuple[str, ...]] = ("lugre",)
     in_rows: ClassVar[bool] = True
     elements: ClassVar[int] = 8
     """Number of elements; another number is another structure, so a subclass."""
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of all elements together", low=1e-6, nominal=1e4)
     sigma1: Scalar = parameter("N.m.s/rad", "Damping of the elements together", default=0.0, low=0, nominal=100)
-    sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
-    Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=1e-9)
-    Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=1e-9)
-    Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
-    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5, fitted=False)
     spread: Scalar = parameter(
         "1",
         "Slip displacement of the last element over the first",
@@ -61,14 +55,6 @@ class MaxwellSlip(FrictionLaw):
         """One state an element: its torque, from the stiffest to the softest."""
         names = [f"element_{index}" for index in range(1, self.elements + 1)]
         return tuple(Variable(name=name, unit="N.m", description="Torque of an element", nominal=0.1) for name in names)
-
-    def level(self, v: Scalar) -> Scalar:
-        """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
-        return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
-
-    def viscous(self, v: Scalar) -> Scalar:
-        """`sigma2 v`."""
-        return self.sigma2 * v
 
     def stiffness(self) -> Any:
         """Stiffness of each element [N m/rad], a column whose sum is sigma0; N > 1."""
@@ -95,10 +81,6 @@ class MaxwellSlip(FrictionLaw):
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         """`sum F_i + sigma1 sum dF_i/dt / sigma0`."""
         return ca.sum1(state) + self.sigma1 * ca.sum1(self.rate(state, v, level)) / self.sigma0
-
-    def steady(self) -> Stribeck:
-        """Return the law's own steady sliding map."""
-        return Stribeck(Fc=self.Fc, Fs=self.Fs, Vs=self.Vs, delta=self.delta, sigma2=self.sigma2)
 
     def broken_passivity(self) -> str:
         """Say where, in either direction, elements that fall from Fs to Fc give back by damping what sigma2 leaves."""

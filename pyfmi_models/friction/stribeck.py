@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.friction.base import MemorylessLaw, stribeck_level
+from pyfmi_models.friction.base import GreasedLaw, MemorylessLaw, stribeck_level
 from pyfmi_models.model import Scalar, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stribeck(MemorylessLaw):
+class Stribeck(GreasedLaw, MemorylessLaw):
     """Steady sliding friction that falls from break-away to Coulomb level.
 
         F(v) = [Fc + (Fs - Fc) exp(-|v/Vs|^delta)] sign(v) + sigma2 v
@@ -18,7 +18,6 @@ class Stribeck(MemorylessLaw):
     """
 
     key: ClassVar[str] = "static"
-    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=0)
     Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=0)
     Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9)
@@ -29,6 +28,23 @@ class Stribeck(MemorylessLaw):
         """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
         return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
 
-    def viscous(self, v: Scalar) -> Scalar:
-        """`sigma2 v`."""
-        return self.sigma2 * v
+
+@dataclass(frozen=True, kw_only=True)
+class StribeckContact(GreasedLaw):
+    """A contact that bends before it slides, and slides at the level of Stribeck's curve."""
+
+    sigma0: Scalar = parameter("N.m/rad", "Bristle stiffness", low=1e-6, nominal=1e4)
+    sigma1: Scalar = parameter("N.m.s/rad", "Bristle damping", default=0.0, low=0, nominal=100)
+    sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
+    Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=1e-9)
+    Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=1e-9)
+    Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
+    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5, fitted=False)
+
+    def level(self, v: Scalar) -> Scalar:
+        """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
+        return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
+
+    def steady(self) -> Stribeck:
+        """Return the law's own steady sliding map."""
+        return Stribeck(Fc=self.Fc, Fs=self.Fs, Vs=self.Vs, delta=self.delta, sigma2=self.sigma2)
