@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, product
-from math import atan2, hypot, inf, pi
+from math import atan2, hypot, inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from cosim.data.neighbours import Neighbour
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import HELD, UNSEEN, Evidence, Hypothesis, Reach
-from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.candidates import Candidate, Span, sized, wave
 from cosim.diagnosis.effects.tuning import restarted
 from cosim.estimation.fit import Fit
 from cosim.estimation.neighbours import key
@@ -128,18 +128,9 @@ def _pairs(several: Sequence[Neighbour], mount: Mount) -> list[str]:
 
 def _hung_on(pair: str) -> Iterator[Candidate]:
     """Weights that may hang on two neighbours."""
-    for own, other in TURNS:
-
-        def chain(c: Array, own: float = own, other: float = other) -> Effect:
-            return _chain(pair, (own, other), hypot(*c), atan2(c[1], c[0]))
-
-        both = tuple(_chain(pair, (own, other), 0.0, phase) for phase in (0.0, pi / 2))
-        yield Candidate("axis_coupling", both, ("weight",), chain)
-
-    def space(c: Array) -> Effect:
-        return SpaceCoupling(neighbour=pair, **dict(zip(PRODUCTS, map(float, c), strict=True)))
-
-    yield Candidate("axis_coupling", (SpaceCoupling(neighbour=pair),), PRODUCTS, space)
+    for turns in TURNS:
+        yield wave(_chain(pair, turns, 0.0, 0.0))
+    yield sized(SpaceCoupling(neighbour=pair), names=PRODUCTS)
 
 
 def _chain(pair: str, turns: tuple[float, float], weight: float, phase: float) -> ChainCoupling:
@@ -149,26 +140,10 @@ def _chain(pair: str, turns: tuple[float, float], weight: float, phase: float) -
 
 def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
     """What one neighbour may do."""
-
-    def inertia(c: Array) -> Effect:
-        return AxisCoupling(inertia=float(c[0]), neighbour=one.name)
-
-    def damped(c: Array) -> Effect:
-        return DampedCoupling(inertia=float(c[0]), damping=float(c[1]), neighbour=one.name)
-
-    yield Candidate("axis_coupling", (AxisCoupling(neighbour=one.name),), ("inertia",), inertia)
-    drag = DampedCoupling(damping=0.0, neighbour=one.name)
-    yield Candidate("axis_coupling", (drag,), ("inertia", "damping"), damped)
+    yield sized(AxisCoupling(neighbour=one.name))
+    yield sized(DampedCoupling(damping=0.0, neighbour=one.name), names=("inertia", "damping"))
     for follows in FOLLOWS if _both_turn(one, mount) else ():
-
-        def weight(c: Array, follows: float = follows) -> Effect:
-            size, phase = hypot(*c), atan2(c[1], c[0])
-            return WeightCoupling(weight=size, phase=phase, follows=follows, neighbour=one.name)
-
-        pair = tuple(
-            WeightCoupling(weight=0.0, phase=phase, follows=follows, neighbour=one.name) for phase in (0.0, pi / 2)
-        )
-        yield Candidate("axis_coupling", pair, ("weight",), weight)
+        yield wave(WeightCoupling(weight=0.0, follows=follows, neighbour=one.name))
 
 
 def _both_turn(one: Neighbour, mount: Mount) -> bool:

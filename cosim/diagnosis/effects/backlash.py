@@ -2,16 +2,16 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
-from typing import Any, ClassVar
+from itertools import islice, product
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
+from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen, with_numbers
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, of_both_ways, span_of
-from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted
+from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted, with_last
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import Columns, far_torques, torques_of_grid
 from cosim.estimation.prepare import Array, Prepared
@@ -20,7 +20,6 @@ from cosim.estimation.row_weights import least_way
 from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
 LEAST_SHARE = 0.09
@@ -67,6 +66,7 @@ class Play(Hypothesis[Backlash]):
     easiest: ClassVar[int] = 1
     rank: ClassVar[float] = 21
     view = "since reversal"
+    acts = Where(axis="time since reversal", description="after each reversal, until the play is crossed")
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """The nearest play, and the best of the grid."""
@@ -75,7 +75,7 @@ class Play(Hypothesis[Backlash]):
         ratio = float(f"{law['sigma2'] / level:.1g}") if level else 0.0
         bent = {"load_deflection": float(f"{level / law['sigma0']:.1g}")} if law["sigma0"] and level else {}
         gaps, slowings = GAPS * span.reach, COASTING * rms(span.prepared.stacked("a"))
-        grid = _grid(gaps, slowings)
+        grid = tuple(product(gaps.tolist(), slowings.tolist()))
         alike = _alike(torques_of_grid(span.prepared, grid, ratio), span)
         likely = [(*grid[index], ratio) for index in np.argsort(alike)[: -BEST - 1 : -1]]
         for gap, slowing, drag in [_nearest(span, gaps, slowings, (LITTLE * ratio, ratio)), *likely]:
@@ -140,10 +140,6 @@ class Play(Hypothesis[Backlash]):
         """Wider gaps."""
         return f"wider than {seen.low:.2g} {'m' if mount.motion == 'linear' else 'rad'}"
 
-    def where(self, effect: Backlash, reach: Reach) -> Where:
-        """After each reversal."""
-        return Where(axis="time since reversal", description="after each reversal, until the play is crossed")
-
 
 def _law(mount: Mount) -> dict[str, float]:
     """Numbers of a friction law, the mean of both directions; 0 where it has none."""
@@ -153,19 +149,17 @@ def _law(mount: Mount) -> dict[str, float]:
 def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
     """The best fit from the card's friction, half of it behind a play, at several gaps."""
     law, reach = _law(problem.mount), float(np.ptp(problem.prepared.stacked("q")))
-    torques = {v.name: HALF * v.start for v in problem.mount.parameters() if _is_friction(v)}
-    halved = with_values(
-        replace(found.mount, friction=problem.mount.friction), [*torques], np.array([*torques.values()])
-    )
+    rubbing = [one for one in problem.mount.parameters() if one.name.startswith("friction.")]
+    torques = {one.name: HALF * one.start for one in rubbing if one.unit.startswith("N")}  # for a speed or a way too
+    whole = replace(found.mount, friction=problem.mount.friction)
+    halved = with_values(whole, [*torques], np.array([*torques.values()]))
     bent = {"load_deflection": law["Fc"] / law["sigma0"]} if law["sigma0"] else {}
     behind = Backlash(
         gap_rad=1.0, load_share=SHARE, load_friction=HALF * law["Fc"], load_viscous=HALF * law["sigma2"], **bent
     )
     rough = in_most_turns(problem)
-    fits = [
-        rough.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), FEW)
-        for gap in (SHARED_GAPS * reach).tolist()
-    ]
+    gaps = (SHARED_GAPS * reach).tolist()
+    fits = [rough.fit(with_last(halved, replace(behind, gap_rad=gap)), FEW) for gap in gaps]
     return problem.fit(max(fits, key=evidence).mount, 24)
 
 
@@ -173,31 +167,17 @@ def _apart(ends: Sequence[Fit], evidence: Evidence) -> list[Fit]:
     """Fits that ended at different gaps, the best first."""
     found: list[Fit] = []
     for one in sorted(ends, key=evidence, reverse=True):
-        gap = _gap(one)
-        if all(abs(_gap(other) - gap) > ALIKE * gap for other in found):
+        gap, *others = (float(cast(Any, fit.mount.effects[-1]).gap_rad) for fit in (one, *found))
+        if all(abs(other - gap) > ALIKE * gap for other in others):
             found.append(one)
     return found
-
-
-def _gap(fit: Fit) -> float:
-    play: Any = fit.mount.effects[-1]
-    return float(play.gap_rad)
-
-
-def _is_friction(variable: Variable) -> bool:
-    """Whether it is a torque of the friction law, or one for a speed or a way."""
-    return variable.name.startswith("friction.") and variable.unit.startswith("N")
-
-
-def _grid(gaps: Array, slowings: Array) -> tuple[tuple[float, float], ...]:
-    return tuple((gap, slowing) for gap in gaps.tolist() for slowing in slowings.tolist())
 
 
 def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) -> tuple[float, float, float]:
     """Gap, deceleration, viscous over dry friction of the play that looks most like the residual, on finer grids."""
     look: Callable[..., Columns] = torques_of_grid
     for window in WINDOWS:
-        grid = _grid(gaps, slowings)
+        grid = tuple(product(gaps.tolist(), slowings.tolist()))
         alike = {ratio: _alike(look(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)}
         look = far_torques
         ratio = max(alike, key=lambda one: float(alike[one].max()))

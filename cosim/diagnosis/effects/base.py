@@ -56,6 +56,8 @@ View = Literal[
     "load",
 ]
 """Views of recordings that a report can draw, each before and after."""
+EVERYWHERE = Where(axis="everywhere", description="everywhere", regions=())
+QUICK_CHANGES = Where(axis="frequency", description="wherever the torque changes quickly", regions=())
 
 
 class Reach(NamedTuple):
@@ -100,6 +102,8 @@ class Hypothesis(Generic[Form]):
     has_own_phase: ClassVar[bool] = False
     """Whether its phase is another in each recording."""
     view: ClassVar[View] = "position"
+    acts: ClassVar[Where] = EVERYWHERE
+    """Where it acts, if that is the same whatever its numbers are."""
     easiest: ClassVar[int] = 0
     """Where the main number says where the effect sets in: whether less (-1) or more (1) of it is easier to find."""
     member: ClassVar[str] = ""
@@ -163,13 +167,9 @@ class Hypothesis(Generic[Form]):
         """How far motion must turn back to show the fitted effect [rad, m]."""
         return 0.0
 
-    def late(self, problem: Problem, effect: Form) -> float | None:
-        """Seconds by which the effect makes the torque late against the reading; None if it is not late."""
-        return None
-
     def where(self, effect: Form, reach: Reach) -> Where:
         """Where a fitted effect acts, within what was visited."""
-        return EVERYWHERE
+        return self.acts
 
     def further(self, waves: Sequence[Form]) -> str:
         """A sentence on the further waves of a ripple: each with its cycles and size, largest first."""
@@ -224,8 +224,6 @@ def _size(wave: Effect) -> float:
     return float(main.factor * getattr(wave, main.parameter))
 
 
-EVERYWHERE = Where(axis="everywhere", description="everywhere", regions=())
-QUICK_CHANGES = Where(axis="frequency", description="wherever the torque changes quickly", regions=())
 HELD = "the model has it already"
 NO_FRICTION = "the card says that there is no friction"
 NO_POSITION = "no position was recorded"

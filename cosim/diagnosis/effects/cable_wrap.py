@@ -29,13 +29,14 @@ class Cable(Hypothesis[CableWrap]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """A spring whose home is where its torque vanishes: two homes span them all."""
-        homes = [float(home) for home in np.quantile(span.q, [0.1, 0.9])]
+        homes, room = np.quantile(span.q, [0.1, 0.9]).tolist(), BESIDE * span.reach
+        most = float(span.q.min()) - room, float(span.q.max()) + room
         for hardening in (0.0, 4.0 / span.reach**2):
 
             def start(c: Array, hardening: float = hardening) -> Effect:
                 stiffness = float(c[0] + c[1])
                 home = float(c @ homes) / stiffness if stiffness > 0 else float(np.mean(homes))
-                home = float(np.clip(home, *_home_range(span)))
+                home = float(np.clip(home, *most))
                 return CableWrap(stiffness=max(stiffness, 1e-9), home=home, hardening=hardening)
 
             pair = tuple(CableWrap(stiffness=0.0, home=home, hardening=hardening) for home in homes)
@@ -50,8 +51,3 @@ class Cable(Hypothesis[CableWrap]):
         low, high = problem.prepared.ranges["q"]
         room = BESIDE * (high - low)
         return not low - room <= float(effect.home) <= high + room
-
-
-def _home_range(span: Span) -> tuple[float, float]:
-    """Positions where a home may be."""
-    return float(span.q.min()) - BESIDE * span.reach, float(span.q.max()) + BESIDE * span.reach

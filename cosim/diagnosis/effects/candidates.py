@@ -8,7 +8,8 @@ fitted coefficients into an effect from which a joint nonlinear fit goes on. The
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from math import atan2, hypot, inf, pi
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -76,6 +77,29 @@ class Span:
     def reach(self) -> float:
         """Range of positions."""
         return self.prepared.reach
+
+
+def sized(effect: Effect, low: float = -inf, high: float = inf, names: Sequence[str] = ()) -> Candidate:
+    """A candidate whose coefficients are, within limits, what numbers of an effect (its main one) differ by from it."""
+    linear, change = tuple(names) or (effect.main.parameter,), cast(Any, replace)
+
+    def start(c: Array) -> Effect:
+        numbers = [float(np.clip(getattr(effect, name) + one, low, high)) for name, one in zip(linear, c, strict=True)]
+        return cast(Effect, change(effect, **dict(zip(linear, numbers, strict=True))))
+
+    return Candidate(effect.id, (effect,), linear, start)
+
+
+def wave(effect: Effect, sign: int = 1, low: float = 0.0, high: float = inf) -> Candidate:
+    """A candidate of two phases of an effect, a quarter of a wave on or (`sign` -1) back: its size within limits."""
+    size, change = effect.main.parameter, cast(Any, replace)
+
+    def start(c: Array) -> Effect:
+        found = float(np.clip(hypot(*c), low, high))
+        return cast(Effect, change(effect, phase=atan2(sign * c[1], c[0]), **{size: found}))
+
+    pair = tuple(change(effect, phase=phase, **{size: 0.0}) for phase in (0.0, sign * pi / 2))
+    return Candidate(effect.id, pair, (size,), start)
 
 
 def of_both_ways(value: float | Pair | None) -> float:

@@ -1,15 +1,13 @@
 """Torque ripple locked to position."""
 
 from collections.abc import Iterator
-from math import atan2, hypot, pi
 from typing import ClassVar
 
 from cosim.diagnosis.effects.base import LEAST_CYCLES, Rippled
-from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.candidates import Candidate, Span, wave
 from cosim.diagnosis.effects.periodogram import peaks
-from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from pyfmi_models.effects import Cogging, Effect
+from pyfmi_models.effects import Cogging
 from pyfmi_models.mount import Mount
 
 
@@ -33,9 +31,4 @@ class Ripple(Rippled[Cogging]):
 
     def wave(self, cycles: float) -> Candidate:
         """Torque with so many cycles."""
-
-        def start(c: Array) -> Effect:
-            return Cogging(cycles_per_rev=cycles, amplitude=hypot(*c), phase=atan2(-c[1], c[0]))
-
-        pair = tuple(Cogging(cycles_per_rev=cycles, amplitude=0.0, phase=phase) for phase in (0.0, -pi / 2))
-        return Candidate("cogging", pair, ("amplitude",), start)
+        return wave(Cogging(cycles_per_rev=cycles, amplitude=0.0), -1)

@@ -9,14 +9,13 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, of_that_size
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, sized
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import far_from_turns
-from pyfmi_models.effects import Effect
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 from pyfmi_models.mount import Mount
 
@@ -52,13 +51,7 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
         if not hasattr(mount.friction, "sigma2"):
             return
         for share in THINNING:
-            speed = share * span.top
-
-            def start(c: Array, speed: float = speed) -> Effect:
-                return ConcaveViscous(thinning_speed=speed, exponent=float(np.clip(1 + c[0], 0.0, 0.9)))
-
-            straight = ConcaveViscous(thinning_speed=speed, exponent=1.0)
-            yield Candidate("concave_viscous", (straight,), ("exponent",), start)
+            yield sized(ConcaveViscous(thinning_speed=share * span.top, exponent=1.0), 0.0, 0.9)
 
     def tuned(self, problem: Problem, found: Fit, start: ConcaveViscous, evidence: Evidence) -> Fit:
         """Start from each speed: what thins early and little resembles what thins late and much."""

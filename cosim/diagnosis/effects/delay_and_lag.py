@@ -17,8 +17,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from cosim.diagnosis.answer.result import Where
-from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis, Reach
+from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.prepare import Array, Piece, Prepared
@@ -54,6 +53,7 @@ class LateTorque(Hypothesis[Drive]):
     finds_its_way: ClassVar[bool] = True
     is_timing: ClassVar[bool] = True
     view = "phase"
+    acts = QUICK_CHANGES
 
     def may_come(self, mount: Mount) -> bool:
         """A delay beside a lag too."""
@@ -80,19 +80,11 @@ class LateTorque(Hypothesis[Drive]):
         """The other of the two, as late."""
         return [timed(form, milliseconds(effect)) for form in self.forms if form is not type(effect)]
 
-    def late(self, problem: Problem, effect: Drive) -> float | None:
-        """As late as it says."""
-        return 1e-3 * milliseconds(effect)
-
     def is_degenerate(self, problem: Problem, effect: Drive) -> bool:
         """Too short to be told from the time stamps', or a lag that lies in the clocks."""
         if milliseconds(effect) < self.least(problem.sample_time):
             return True
         return attributed(problem.prepared, 1e-3 * milliseconds(effect), problem.sample_time) == "clock"
-
-    def where(self, effect: Drive, reach: Reach) -> Where:
-        """Wherever the torque changes."""
-        return QUICK_CHANGES
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """Nothing asks, or the drive has something alike already."""

@@ -7,12 +7,10 @@ from typing import Any, ClassVar
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Evidence, Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, sized
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from pyfmi_models.effects import Effect
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.mount import Mount
 
@@ -56,8 +54,4 @@ class Settling(Hypothesis[DwellBreakaway]):
         """Ages of the contact that a small or a larger slip renews."""
         for share in (1e-3, 4e-3):
             fresh = DwellBreakaway(torque_per_efold=0.0, onset_s=0.1, memory_rad=share * span.reach)
-
-            def start(c: Array, fresh: DwellBreakaway = fresh) -> Effect:
-                return replace(fresh, torque_per_efold=max(float(c[0]), 1e-6 * contact_level(mount)))
-
-            yield Candidate("dwell_breakaway", (fresh,), ("torque_per_efold",), start)
+            yield sized(fresh, 1e-6 * contact_level(mount))

@@ -2,20 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import atan2, hypot, pi
+from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Cyclic, Evidence
-from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.candidates import Candidate, Span, wave
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.diagnosis.effects.tuning import in_cycles, restarted
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from pyfmi_models.effects import Effect
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.mount import Mount
 
@@ -37,12 +35,7 @@ class Eccentricity(Cyclic[EncoderEccentricity]):
         """Cycles over angle of what grows with the square of the speed."""
         fast = replace(span, residual=span.residual * (span.v / span.top) ** 2)
         for cycles in peaks(fast, fast.residual):
-
-            def start(c: Array, cycles: float = cycles) -> Effect:
-                return EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=hypot(*c), phase=atan2(c[1], c[0]))
-
-            pair = tuple(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0, phase=p) for p in (0.0, pi / 2))
-            yield Candidate("encoder_eccentricity", pair, ("amplitude_rad",), start)
+            yield wave(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0))
 
     def tuned(self, problem: Problem, found: Fit, start: EncoderEccentricity, evidence: Evidence) -> Fit:
         """Ask a disc of half the turns whether what was found is its error twice a turn.

@@ -3,13 +3,11 @@
 from collections.abc import Iterator
 from typing import ClassVar
 
-import numpy as np
-
 from cosim.diagnosis.answer.result import Where
-from cosim.diagnosis.effects.base import RESTLESS, Hypothesis, Reach
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
-from cosim.estimation.prepare import Array, Prepared
-from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
+from cosim.diagnosis.effects.base import RESTLESS, Hypothesis
+from cosim.diagnosis.effects.candidates import Candidate, Span, has, sized
+from cosim.estimation.prepare import Prepared
+from pyfmi_models.effects import FrictionAsymmetry, TorqueOffset
 from pyfmi_models.effects.constant_force import ConstantForce
 from pyfmi_models.mount import Mount
 
@@ -22,6 +20,7 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
     rank: ClassVar[float] = 2
     needs_position: ClassVar[bool] = False
     view = "keep turning"
+    acts = Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Both directions alike, their two differences as columns; beside an offset only where rest tells them apart.
@@ -29,20 +28,9 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
         Levels of two directions and an offset are two numbers of an axis that moves: with all three, one direction may
         lose its friction altogether, and whatever the other has is explained by a name that it is not.
         """
-        if _is_alike(mount):
-            return
-        linear = ("level_asymmetry", "viscous_asymmetry")
-        neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
-
-        def start(c: Array) -> Effect:
-            a, b = (float(np.clip(x, -0.5, 0.5)) for x in c)  # inside of what a fit may say
-            return FrictionAsymmetry(level_asymmetry=a, viscous_asymmetry=b)
-
-        yield Candidate("friction_asymmetry", (neutral,), linear, start)
-
-    def where(self, effect: FrictionAsymmetry, reach: Reach) -> Where:
-        """Both directions."""
-        return Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
+        if not _is_alike(mount):
+            neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
+            yield sized(neutral, -0.5, 0.5, self.sizes)  # inside of what a fit may say
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from an offset."""

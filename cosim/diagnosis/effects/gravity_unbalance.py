@@ -1,14 +1,13 @@
 """A load off the axis."""
 
 from collections.abc import Iterator
-from math import atan2, hypot, pi
 from typing import ClassVar
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Hypothesis, Reach, visited
-from cosim.diagnosis.effects.candidates import Candidate, Span
-from cosim.estimation.prepare import Array, Prepared
-from pyfmi_models.effects import Effect, GravityUnbalance
+from cosim.diagnosis.effects.candidates import Candidate, Span, wave
+from cosim.estimation.prepare import Prepared
+from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.mount import Mount
 
 
@@ -22,12 +21,7 @@ class Unbalance(Hypothesis[GravityUnbalance]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Sine and cosine of the angle."""
-
-        def start(c: Array) -> Effect:
-            return GravityUnbalance(mgl=hypot(*c), phase=atan2(c[1], c[0]))
-
-        pair = (GravityUnbalance(mgl=0.0, phase=0.0), GravityUnbalance(mgl=0.0, phase=pi / 2))
-        yield Candidate("gravity_unbalance", pair, ("mgl",), start)
+        yield wave(GravityUnbalance(mgl=0.0))
 
     def where(self, effect: GravityUnbalance, reach: Reach) -> Where:
         """At all positions."""

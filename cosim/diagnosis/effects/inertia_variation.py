@@ -1,15 +1,10 @@
 """Inertia that depends on where the axis is."""
 
 from collections.abc import Iterator
-from math import atan2, hypot, pi
 from typing import ClassVar
 
-import numpy as np
-
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span
-from cosim.estimation.prepare import Array
-from pyfmi_models.effects import Effect
+from cosim.diagnosis.effects.candidates import Candidate, Span, wave
 from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.mount import Mount
 
@@ -30,11 +25,4 @@ class VaryingInertia(Hypothesis[InertiaVariation]):
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Once to four times a turn; on a linear axis half a wave to three over the stroke."""
         for cycles in TURNS if mount.motion == "rotary" else [waves / span.reach for waves in STROKES]:
-
-            def start(c: Array, cycles: float = cycles) -> Effect:
-                size = float(np.clip(hypot(*c), 1e-6, 0.9))
-                return InertiaVariation(relative_amplitude=size, cycles_per_rev=cycles, phase=atan2(-c[1], c[0]))
-
-            phases = (0.0, -pi / 2)
-            pair = tuple(InertiaVariation(relative_amplitude=0.0, cycles_per_rev=cycles, phase=p) for p in phases)
-            yield Candidate("inertia_variation", pair, ("relative_amplitude",), start)
+            yield wave(InertiaVariation(relative_amplitude=0.0, cycles_per_rev=cycles), -1, 1e-6, 0.9)

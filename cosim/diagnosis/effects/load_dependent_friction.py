@@ -1,15 +1,11 @@
 """Friction that grows with the weight on the bearings, or with all torque through a gear."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has
-from cosim.estimation.prepare import Array
-from pyfmi_models.effects import Effect, PayloadEffect
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, has, sized
+from pyfmi_models.effects import PayloadEffect
 from pyfmi_models.effects.load_dependent_friction import GearLoadFriction, LoadDependentFriction, LoadScaledFriction
 from pyfmi_models.mount import Mount
 
@@ -35,12 +31,7 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
             forms += [LoadScaledFriction(**known)] if weight else []
             forms += [GearLoadFriction(**known, inertia_share=1.0, friction_share=one) for one in SIDES]
         for form in forms:
-            most = 0.5 if form.feels_inertia else 5.0
-
-            def start(c: Array, form: LoadDependentFriction = form, most: float = most) -> Effect:
-                return replace(form, coulomb_per_Nm=float(np.clip(c[0], 1e-6, most)))
-
-            yield Candidate("load_dependent_friction", (form,), ("coulomb_per_Nm",), start)
+            yield sized(form, 1e-6, 0.5 if form.feels_inertia else 5.0)
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """What rises with the weight, where there is one: its size counts in another torque than a gear's."""

@@ -7,12 +7,11 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import PASSED, WAVES, Hypothesis, Reach, Seen, with_numbers
-from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.candidates import Candidate, Span, sized
 from cosim.diagnosis.effects.periodogram import tones
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.tonal_disturbance import detectable_band
-from pyfmi_models.effects import Effect
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.mount import Mount
 
@@ -36,12 +35,7 @@ class Tone(Hypothesis[PeriodicDisturbance]):
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """A tone each."""
         for hertz in tones(span, span.residual):
-
-            def start(c: Array, hertz: float = hertz) -> Effect:
-                return PeriodicDisturbance(frequency_hz=hertz, amplitude=max(float(c[0]), 1e-12))
-
-            still = PeriodicDisturbance(frequency_hz=hertz, amplitude=0.0)
-            yield Candidate("periodic_disturbance", (still,), ("amplitude",), start)
+            yield sized(PeriodicDisturbance(frequency_hz=hertz, amplitude=0.0), 1e-12)
 
     def is_degenerate(self, problem: Problem, effect: PeriodicDisturbance) -> bool:
         """Outside the detectable band it is drift, or noise."""

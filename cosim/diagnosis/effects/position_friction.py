@@ -1,8 +1,6 @@
 """Friction that depends on where the axis is: periodic, or a rough spot."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from math import atan2, hypot, pi
 from typing import ClassVar
 
 import numpy as np
@@ -10,11 +8,11 @@ import numpy as np
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Hypothesis, Reach, Rippled, turn
-from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.candidates import Candidate, Span, sized, wave
 from cosim.diagnosis.effects.periodogram import peaks
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import bend, least_way
-from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
+from pyfmi_models.effects import LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 
 
@@ -45,13 +43,7 @@ class FrictionRipple(Rippled[PeriodicFriction]):
 
     def wave(self, cycles: float) -> Candidate:
         """Friction with so many cycles."""
-
-        def start(c: Array) -> Effect:
-            size = min(hypot(*c), 0.9)
-            return PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=size, phase=atan2(-c[1], c[0]))
-
-        pair = tuple(PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=0.0, phase=p) for p in (0.0, -pi / 2))
-        return Candidate("position_friction", pair, ("relative_amplitude",), start)
+        return wave(PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=0.0), -1, high=0.9)
 
 
 class RoughSpot(Hypothesis[LocalFriction]):
@@ -68,11 +60,7 @@ class RoughSpot(Hypothesis[LocalFriction]):
             width = share * (high - low)
             for center in np.arange(low + width, high - width / 2, 1.7 * width):
                 spot = LocalFriction(q_center=float(center), width=float(width), relative_amplitude=0.0)
-
-                def start(c: Array, spot: LocalFriction = spot) -> Effect:
-                    return replace(spot, relative_amplitude=float(np.clip(c[0], -0.9, 15)))
-
-                yield Candidate("position_friction", (spot,), ("relative_amplitude",), start)
+                yield sized(spot, -0.9, 15)
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """None: where a spot is, is one of too many places; the bound is that of a ripple."""

@@ -1,20 +1,17 @@
 """A Stribeck curve, for a law that has none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen
-from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level
-from cosim.diagnosis.effects.tuning import at_bound, freed
+from cosim.diagnosis.effects.candidates import Candidate, Span, contact_level, sized
+from cosim.diagnosis.effects.tuning import at_bound, freed, restarted, with_last
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import NO_BETTER
-from pyfmi_models.effects import Effect, StribeckEffect
+from pyfmi_models.effects import StribeckEffect
 from pyfmi_models.friction.base import LEAST_VS
 from pyfmi_models.mount import Mount
 
@@ -40,13 +37,8 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
         """Five widths; a curve starts flat, at the level of the contact."""
         base = contact_level(mount)
         for share in CURVES:
-            Vs = share * span.top
-
-            def start(c: Array, Vs: float = Vs) -> Effect:
-                # Far from a level at rest the tangent says little: a fit that starts from half to twice finds its way.
-                return StribeckEffect(Fs=float(np.clip(base + c[0], 0.5 * base, 2 * base)), Vs=Vs)
-
-            yield Candidate("stribeck", (StribeckEffect(Fs=base, Vs=Vs),), ("Fs",), start)
+            # Far from a level at rest the tangent says little: a fit that starts from half to twice finds its way.
+            yield sized(StribeckEffect(Fs=base, Vs=share * span.top), 0.5 * base, 2 * base)
 
     def none(self, mount: Mount) -> float:
         """The level of the contact."""
@@ -65,8 +57,8 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
         A friction that was refitted without a curve lies somewhere on it: from a level that holds what falls, or from a
         slope that has gone, no step leads back. So these fits start from the card's friction.
         """
-        others, card = found.mount.effects[:-1], problem.mount.friction
-        starts = [replace(found.mount, friction=card, effects=(*others, one)) for one in _widths(problem, start)]
+        rubbing = replace(found.mount, friction=problem.mount.friction)
+        starts = [with_last(rubbing, replace(start, Vs=share * problem.top_speed)) for share in CURVES]
         return _shaped(problem, max((found, *(problem.fit(one, 36) for one in starts)), key=evidence))
 
     def is_degenerate(self, problem: Problem, effect: StribeckEffect) -> bool:
@@ -84,22 +76,13 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
 
     def is_settled(self, mount: Mount) -> bool:
         """A law may have the curve itself."""
-        return _has_curve(mount) or super().is_settled(mount)
-
-
-def _has_curve(mount: Mount) -> bool:
-    return getattr(mount.friction, "Fs", None) is not None
-
-
-def _widths(problem: Problem, start: StribeckEffect) -> Sequence[StribeckEffect]:
-    return [replace(start, Vs=share * problem.top_speed) for share in CURVES]
+        return getattr(mount.friction, "Fs", None) is not None or super().is_settled(mount)
 
 
 def _shaped(problem: Problem, found: Fit) -> Fit:
     """Try the sharper Stribeck curve of the literature too, and any shape if that fits clearly better."""
     gauss: Any = found.mount.effects[-1]
-    sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
-    best = min((found, problem.fit(sharper, 36)), key=problem.error)
+    best = min((found, restarted(problem, found, replace(gauss, delta=SHARP))), key=problem.error)
     free = freed(problem, best, "delta")
     better = problem.error(free) * (1 + NO_BETTER) < problem.error(best)
     return free if better and not at_bound(free.mount.effects[-1]) else best

@@ -1,15 +1,12 @@
 """Friction that drifts with temperature."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from cosim.diagnosis.effects.base import Hypothesis
-from cosim.diagnosis.effects.candidates import Candidate, Span
-from cosim.estimation.prepare import Array
-from pyfmi_models.effects import Effect
+from cosim.diagnosis.effects.candidates import Candidate, Span, sized
 from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
 from pyfmi_models.mount import Mount
 
@@ -33,16 +30,11 @@ class ThermalFriction(Hypothesis[ThermalViscosity]):
         if "temperature" not in span.extras:
             forms = [form for share in (0.25, 1.0) for form in _warming(share * span.seconds, span)]
         for form in forms:
-
-            def start(c: Array, form: ThermalViscosity = form) -> Effect:
-                viscous, level = (float(np.clip(x, -0.3, 0.3)) for x in c)
-                return replace(form, viscous_per_degC=viscous, coulomb_per_degC=level)
-
-            yield Candidate("thermal_viscosity", (form,), ("viscous_per_degC", "coulomb_per_degC"), start)
+            yield sized(form, -0.3, 0.3, self.sizes)
 
     def must_fall(self, effect: ThermalViscosity) -> tuple[str, ...]:
         """Lubricants thin as they warm; where no thermometer saw it, a level that falls alone may be wearing in."""
-        return ("viscous_per_degC", "coulomb_per_degC") if type(effect) is ThermalViscosity else ("viscous_per_degC",)
+        return self.sizes if type(effect) is ThermalViscosity else self.sizes[:1]
 
 
 def _warming(seconds: float, span: Span) -> tuple[ThermalViscosity, ...]:

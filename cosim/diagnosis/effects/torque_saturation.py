@@ -5,11 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.diagnosis.answer.result import Where
-from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis, Reach, Seen, of_that_size
-from cosim.diagnosis.effects.candidates import Candidate, Span
-from cosim.estimation.prepare import Array
-from pyfmi_models.effects import Effect
+from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis, Seen, of_that_size
+from cosim.diagnosis.effects.candidates import Candidate, Span, sized
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.mount import Mount
 
@@ -24,18 +21,14 @@ class Saturation(Hypothesis[TorqueSaturation]):
     rank: ClassVar[float] = 15
     needs_position: ClassVar[bool] = False
     view = "load"
+    acts = QUICK_CHANGES
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Knees below the highest torques that were asked for."""
         for share in (0.8, 0.9, 0.96, 0.985):
             knee = float(np.quantile(np.abs(span.tau), share))
             if knee > 0:
-
-                def start(c: Array, knee: float = knee) -> Effect:
-                    return TorqueSaturation(knee_torque=knee, slope=float(np.clip(1 + c[0], 0.02, 0.98)))
-
-                full = TorqueSaturation(knee_torque=knee, slope=1.0)
-                yield Candidate("torque_saturation", (full,), ("slope",), start)
+                yield sized(TorqueSaturation(knee_torque=knee, slope=1.0), 0.02, 0.98, ("slope",))
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """Half of what is asked for past each knee."""
@@ -44,7 +37,3 @@ class Saturation(Hypothesis[TorqueSaturation]):
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Lower knees, past which half of what is asked for comes."""
         return f"with a knee below {seen.high:.3g} {'N' if mount.motion == 'linear' else 'N·m'}"
-
-    def where(self, effect: TorqueSaturation, reach: Reach) -> Where:
-        """Where much is asked for."""
-        return QUICK_CHANGES

@@ -14,6 +14,7 @@ from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import NO_BETTER
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Recorded, Variable, parameters_of
+from pyfmi_models.mount import Mount
 
 ANY = Recorded(inf, inf)
 """Where no recording limits what a fit may find."""
@@ -22,6 +23,11 @@ DEAD = 0.1
 AT_END = 1e-6
 """Share of a number by which it may be away from an end of its range and is at that end: a thousand times what a fit
 keeps from there (`estimation/fit.py`), a millionth of any number that was found."""
+
+
+def with_last(mount: Mount, effect: Effect) -> Mount:
+    """A mount with another effect in the place of its last one."""
+    return replace(mount, effects=(*mount.effects[:-1], effect))
 
 
 def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
@@ -35,8 +41,8 @@ def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
     dead = [name for name, value in levels.items() if abs(value) < DEAD * abs(card[name])]
     if not dead:
         return found
-    again = replace(found.mount, effects=(*found.mount.effects[:-1], start))
-    other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 36)
+    again = with_values(with_last(found.mount, start), dead, np.array([card[name] for name in dead]))
+    other = problem.fit(again, 36)
     return min((found, other), key=problem.error)
 
 
@@ -62,7 +68,7 @@ def refound(
 
 def restarted(problem: Problem, found: Fit, start: Effect, steps: int = 36) -> Fit:
     """A fit with its last effect started elsewhere."""
-    return problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], start)), steps)
+    return problem.fit(with_last(found.mount, start), steps)
 
 
 def in_most_turns(problem: Problem) -> Problem:
@@ -85,8 +91,7 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
     ripple: Any = best.mount.effects[-1]
     whole = [] if problem.mount.motion == "linear" else [max(1.0, float(round(ripple.cycles_per_rev)))]
     for cycles in (*whole, ripple.cycles_per_rev):
-        effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
-        settled = problem.fit(replace(best.mount, effects=effects), 24)
+        settled = restarted(problem, best, replace(ripple, cycles_per_rev=cycles), 24)
         if problem.error(settled) < problem.error(best) * (1 + NO_BETTER):
             return settled
     return found

@@ -20,6 +20,7 @@ from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects import candidates, hypothesis_of
+from cosim.diagnosis.effects.clock_skew import Clocks
 from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
 from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
@@ -99,16 +100,14 @@ def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_wa
 @pytest.mark.parametrize(
     ("effect", "seconds"),
     [
-        (Delay(delay_ms=4.0), 4e-3),
-        (ActuatorLag(time_constant_ms=6.0), 6e-3),
         (ClockSkew(offset_ms=-5.0, drift_ppm=0.0), 5e-3),
         (ClockSkew(offset_ms=5.0, drift_ppm=0.0), None),  # the reading is early
         (ClockSkew(offset_ms=-5.0, drift_ppm=-100.0), 7e-3),  # 4 ms in 40 s, 2 ms in their middle
     ],
 )
-def test_what_makes_a_torque_late_says_by_how_many_seconds(effect: Effect, seconds: float | None) -> None:
+def test_a_clock_that_is_late_says_by_how_many_seconds(effect: ClockSkew, seconds: float | None) -> None:
     problem: Any = SimpleNamespace(seconds=40.0, sample_time=1e-3)
-    assert hypothesis_of(effect).late(problem, effect) == (None if seconds is None else pytest.approx(seconds))
+    assert Clocks().late(problem, effect) == (None if seconds is None else pytest.approx(seconds))
 
 
 @pytest.mark.parametrize(
