@@ -26,9 +26,9 @@ TESTS = Path(__file__).parents[1] / "tests"
 sys.path[:0] = [str(TESTS / "tools"), str(TESTS.parent)]
 
 import numpy as np  # noqa: E402
-from browsing import DESK, PATIENCE, PHONE, axe_script, chromium, dropped, opened, processor, violations  # noqa: E402
+from browsing import DESK, PATIENCE, PHONE, chromium, dropped, opened, processor, violations  # noqa: E402
 from damages import damaged  # noqa: E402
-from report_text import text_of  # noqa: E402
+from report_example import text_of  # noqa: E402
 from serving import until  # noqa: E402
 
 from cosim.support.version import __version__  # noqa: E402
@@ -100,12 +100,12 @@ def openings(browser: Any, report: Path) -> list[float]:
 
 def axe(browser: Any, report: Path) -> int:
     """Findings in a report, everything unfolded, on a desk and on a phone, light and dark."""
-    count, script = 0, axe_script()
+    count = 0
     for size, scheme in ((DESK, "light"), (DESK, "dark"), (PHONE, "light")):
         page = browser.new_page(viewport=size, color_scheme=scheme, bypass_csp=True)
         page.goto(report.as_uri())
         page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-        count += len(violations(page, script))
+        count += len(violations(page))
         page.close()
     return count
 

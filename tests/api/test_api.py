@@ -1,28 +1,39 @@
-"""What `import cosim` offers: names, weight, and that every kind of source gives the same answer."""
+"""What `import cosim` offers: names, weight, the same answer from every kind of source, and a line in a notebook."""
 
 import inspect
-import subprocess
 import sys
 from collections.abc import Callable
 from importlib.resources import files
+from inspect import Parameter, signature
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from commands import python
+from matplotlib.figure import Figure
+from report_example import diagnosis
 
 import cosim
-from cosim.api.diagnose import check_split
+from cosim.api.diagnose import DiagnosisResult, check_split
+from cosim.api.tables import missing_frame
+from cosim.cli.verbs import module_of
 from cosim.data.recording import Recording
+from cosim.support.notebook import shows_progress
 from cosim.support.plugins import HANDLES, names
 
 FUNCTIONS = ("diagnose", "export", "identify", "read", "run", "show")
 CARD = """
 [mount]
-inertia = 30.0
+name = "axis"
+inertia = 3.0
 [friction]
 model = "coulomb"
-Fc = 2.5
+Fc = 2.0
+sigma2 = 1.0
 """
 SCENARIO = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.2")
 
@@ -32,6 +43,56 @@ def card(tmp_path: Path) -> Path:
     path = tmp_path / "axis.toml"
     path.write_text(CARD, "utf-8")
     return path
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the line of a notebook has shown."""
+    said: list[str] = []
+    shell = SimpleNamespace(config={"IPKernelApp": {}})
+    package, displays = ModuleType("IPython"), ModuleType("IPython.display")
+    package.get_ipython = lambda: shell  # type: ignore[attr-defined]
+
+    def display(content: dict[str, str], **_: Any) -> Any:
+        return SimpleNamespace(update=lambda content, raw: said.append(content["text/plain"]))
+
+    displays.display = display  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", package)
+    monkeypatch.setitem(sys.modules, "IPython.display", displays)
+    return said
+
+
+@shows_progress()
+def work(*, fails: bool = False, on_progress: Any = lambda text: None) -> str:
+    """Work."""
+    on_progress("first")
+    on_progress("at once after it")
+    if fails:
+        raise KeyError
+    return "done"
+
+
+def test_a_line_is_shown_and_gone_at_the_end(line: list[str]) -> None:
+    assert work() == "done"
+    assert line == ["first", ""]  # what comes at once after it is not drawn
+    with pytest.raises(KeyError):
+        work(fails=True)
+    assert line[-1] == ""
+
+
+def test_who_is_told_himself_sees_no_line_and_outside_a_notebook_none_is_shown(
+    line: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    work(on_progress=told.append)
+    monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: None)
+    work()
+    monkeypatch.delitem(sys.modules, "IPython")
+    assert work() == "done"
+    assert (told, line) == (["first", "at once after it"], [])
+
+
+# Every kind of source.
 
 
 def table(rows: int = 400) -> dict[str, np.ndarray]:
@@ -59,15 +120,9 @@ def test_a_function_describes_each_argument_what_it_returns_and_what_it_raises(n
     assert {"Returns", "Raises"} <= described
 
 
-def test_importing_cosim_loads_nothing_heavy_and_takes_no_time() -> None:
-    code = (
-        "import sys, time; before = time.process_time(); import cosim; spent = time.process_time() - before;"
-        "print(spent, *(one for one in ('numpy', 'pydantic', 'casadi', 'typer') if one in sys.modules))"
-    )
-    command = [sys.executable, "-c", code]
-    told = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() for _ in range(3)]
-    assert all(len(one) == 1 for one in told), told
-    assert min(float(spent) for spent, *_ in told) <= 0.05  # of the processor: others may use this machine too
+def test_importing_cosim_takes_no_time() -> None:
+    code = "import time; before = time.process_time(); import cosim; print(time.process_time() - before)"
+    assert min(float(python("-c", code).stdout) for _ in range(3)) <= 0.05  # others may use this machine too
 
 
 def test_a_name_that_is_not_offered_is_refused_with_those_that_are() -> None:
@@ -137,29 +192,16 @@ def test_a_card_is_exported_from_a_file_or_as_it_is(card: Path, tmp_path: Path) 
     assert "axis_plant_fmi3.fmu" in one._repr_html_()
 
 
-def test_numbers_are_identified_from_a_table_in_memory(card: Path) -> None:
-    t = np.arange(2000) * 0.005
-    v = 0.5 * np.sin(2 * np.pi * 0.3 * t)
-    q = np.cumsum(v) * 0.005
-    tau = 2.0 * np.sign(v) + 3.0 * v + 30.0 * np.gradient(v, t)
-    card.write_text(CARD.replace("2.5", "2.5\nsigma2 = 1.0"), "utf-8")
-    found = cosim.identify({"t": t, "tau": tau, "q": q}, card)
-    assert found.identified.map.fits["both"].values[0] == pytest.approx(2.0, rel=0.1)  # type: ignore[union-attr]
-    assert "Friction map" in str(found)
-    assert "Friction map" in found._repr_html_()
-    assert set(found.numbers) >= {"axis.inertia", "friction.Fc"}
-
-
 def recorded(seconds: float, drag: float, seed: int) -> pd.DataFrame:
-    """An axis of 30 kg m2 with 2.5 N m of friction under a swing, and drag [N m s2/rad2] that no card knows."""
+    """An axis of 3 kg m2 with 2.5 N m of friction under a swing, and drag [N m s2/rad2] that no card knows."""
     t = np.arange(0, seconds, 0.01)
     q = 1.2 * np.sin(2 * np.pi * 0.15 * t) + 0.3 * np.sin(2 * np.pi * 0.43 * t + seed)
     v = np.gradient(q, t)
     noise = 0.02 * np.random.default_rng(seed).standard_normal(len(t))
-    return pd.DataFrame({"t": t, "tau": 30 * np.gradient(v, t) + 2.5 * np.sign(v) + drag * v * abs(v) + noise, "q": q})
+    return pd.DataFrame({"t": t, "tau": 3 * np.gradient(v, t) + 2.5 * np.sign(v) + drag * v * abs(v) + noise, "q": q})
 
 
-def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_notebook(card: Path) -> None:
+def test_a_diagnosis_of_data_frames_answers_in_python_and_in_a_notebook(card: Path, line: list[str]) -> None:
     train, heldout = [recorded(30, 4.0, seed) for seed in (1, 2)], recorded(30, 4.0, 3)
     told: list[tuple[str, ...]] = []
     answer = cosim.diagnose(train, heldout, card, on_answer=lambda found: told.append(found.verdict))
@@ -171,6 +213,9 @@ def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_not
     assert "quadratic drag" in answer._repr_html_().lower()
     assert answer.as_json()["verdict"]
     assert "Wrote" not in str(answer)
+    assert line[0].startswith("stage 1 of 3: ")
+    assert any(one.startswith("stage 2 of 3: ") for one in line)
+    assert line[-1] == ""
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks a folder in which no one can make another")
@@ -195,3 +240,94 @@ def test_what_is_shown_is_text_and_a_page_and_a_recording_as_its_file(tmp_path: 
 def test_a_call_without_a_recording_is_refused_in_a_sentence(call: Callable[[list[Recording]], object]) -> None:
     with pytest.raises(cosim.InputError, match="No recording was given: give one at least"):
         call([])
+
+
+# Results in a notebook: one line each, tables, figures; and Python calls that offer what the command line does.
+
+
+@pytest.fixture
+def recording() -> Recording:
+    t = np.arange(3000) * 0.005
+    q = 0.4 * np.sin(2 * t) + 0.1 * np.sin(5 * t)
+    v, a = 0.8 * np.cos(2 * t) + 0.5 * np.cos(5 * t), -1.6 * np.sin(2 * t) - 2.5 * np.sin(5 * t)
+    tau = 3.0 * a + 2.4 * np.sign(v) + 1.2 * v
+    return Recording.of({"t": t, "tau": tau, "q": q, "q_d": q + 1e-3, "heat": t}, "swing")
+
+
+def is_one_line(thing: object) -> bool:
+    return "\n" not in repr(thing) and len(repr(thing)) < 200
+
+
+def test_a_recording_is_one_line_and_a_figure_with_its_set_point_beside_the_position(recording: Recording) -> None:
+    assert is_one_line(recording)
+    before = matplotlib.rcParams["font.size"]
+    drawn = recording.plot()
+    assert isinstance(drawn, Figure)
+    assert [axes.get_title(loc="left") for axes in drawn.axes] == ["tau", "q", "heat"]
+    assert [len(axes.lines) for axes in drawn.axes] == [1, 2, 1]
+    assert drawn.axes[-1].get_xlabel() == "time [s]"
+    assert all(axes.get_ylabel() for axes in drawn.axes)
+    assert [axes.get_title(loc="left") for axes in recording.plot("heat").axes] == ["heat"]
+    assert matplotlib.rcParams["font.size"] == before  # a reader's own settings stay
+    with pytest.raises(cosim.CosimError, match='no column "qq"; columns are: t, tau, q'):
+        recording.plot("qq")
+
+
+def test_a_diagnosis_is_one_line_tables_and_a_figure(card: Path, tmp_path: Path) -> None:
+    answer = DiagnosisResult(diagnosis("two"), cosim.read_card(card), cosim.read_card(card))
+    assert is_one_line(answer)
+    found = answer.frame()
+    assert found.iloc[0]["effect"] == "cogging"
+    assert len(found) == len(answer.findings)
+    missing = answer.missing_torque
+    assert list(missing) == ["recording", "heldout", "t", "q", "v", "missing", "band", "after"]
+    held = missing[missing["heldout"]]
+    assert 0 < np.std(held["after"]) < np.std(held["missing"])
+    drawn = answer.plot()
+    assert [axes.get_xlabel() for axes in drawn.axes] == ["validation RMS error [N·m]", "time [s]"]
+    bars, held_out = [bar.get_width() for bar in drawn.axes[0].patches], answer.diagnosis.heldout
+    assert bars == pytest.approx([held_out.after_rms, held_out.before_rms, held_out.nominal_rms])
+    drawn.savefig(tmp_path / "answer.png")
+    assert missing_frame(()).empty
+
+
+def test_an_identification_and_a_run_are_one_line_a_table_and_a_figure(recording: Recording, card: Path) -> None:
+    found = cosim.identify(recording, card)
+    table = found.frame().set_index("parameter")
+    assert table.loc["friction.Fc", "value"] == pytest.approx(2.4, rel=0.1)
+    assert table.loc["friction.Fc", "given"] == 2.0
+    assert found.identified.map.fits["both"].values[0] == pytest.approx(2.4, rel=0.1)
+    assert "Friction map" in str(found)
+    assert "Friction map" in found._repr_html_()
+    assert set(found.numbers) >= {"axis.inertia", "friction.Fc"}
+    assert {axes.get_ylabel() for axes in found.plot().axes} == {"friction [N m]"}
+    done = cosim.run("sidereal", stop=0.05)
+    assert "time [s]" in {axes.get_xlabel() for axes in done.plot().axes}
+    assert is_one_line(found)
+    assert is_one_line(done)
+
+
+SAME = {
+    "run": {"sets": "set", "interpreted": "compiled"},
+    "compare": {"recordings": "recordings"},
+    "investigate": {"drive": "machine", "key": "machine", "move": "machine"},
+    "show": {"file": "source", "out": "picture"},
+}
+"""Options of the command line that have another word in Python."""
+FOLDER = dict.fromkeys(("workers", "cluster"), "cosim.diagnose_folder")
+METHODS = {"as_json": "as_json", "check": "missing", "propose": "propose", **FOLDER}
+"""Options that are a method or a property of the result, or an argument of the call for several machines."""
+PYTHON_ONLY = {"on_progress", "on_build", "on_answer", "on_step", "command", "fast"}
+"""Arguments that make no sense on a command line: who is told, and what files name as their maker."""
+VERBS = ("run", "diagnose", "export", "show", "sweep", "investigate", "card", "compare")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_command_line_and_python_offer_the_same(verb: str) -> None:
+    command: Any = getattr(module_of(verb), verb)
+    options = {SAME.get(verb, {}).get(name, name) for name in signature(command).parameters}
+    arguments = signature(getattr(cosim, verb)).parameters
+    assert options - (set(METHODS) - set(arguments)) <= set(arguments), "on the command line only"
+    assert set(arguments) - PYTHON_ONLY <= options, "in Python only"
+    told = arguments.get("on_progress")
+    assert told is None or told.kind is Parameter.KEYWORD_ONLY

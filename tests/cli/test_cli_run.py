@@ -1,15 +1,14 @@
 """The command line: data on stdout, messages on stderr, one sentence for a mistake, nothing overwritten unasked."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, cache, call
+from commands import Refused, cache, call, python
 
-import cosim.models.cache
+import cosim.cli.run
 from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.support.errors import ScenarioError
@@ -17,33 +16,26 @@ from cosim.support.errors import ScenarioError
 __all__ = ["cache"]
 
 
-def test_run_writes_a_recording_and_prints_its_path_or_as_json_what_it_also_writes(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    assert call("run", scenario, "--out", out) == 0
+def test_run_writes_a_recording_and_prints_its_path_or_as_json_what_it_also_writes(scenario: Path, capsys: Any) -> None:
+    assert call("run", scenario, "--out", "out") == 0
     said = capsys.readouterr()
-    assert said.out == f"{out / 'recording.parquet'}\n"
+    assert said.out == "out/recording.parquet\n"
     assert "loop: 500 steps of 0.001 s\nRMS tracking error " in said.err
     assert "\n500 steps in " in said.err
     assert "not connected, at their start values: plant.b" in said.err
-    assert len(Recording.read(out / "recording.parquet")) == 250
-    assert call("run", scenario, "--out", out, "--force", "--json") == 0
+    assert len(Recording.read("out/recording.parquet")) == 250
+    assert call("run", scenario, "--out", "out", "--force", "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told == json.loads((out / "run.json").read_text())
-    assert (told["steps"], told["recording"]) == (500, str(out / "recording.parquet"))
+    assert told == json.loads(Path("out/run.json").read_text())
+    assert (told["steps"], told["recording"]) == (500, "out/recording.parquet")
     np.testing.assert_allclose(told["ratio_to_real_time"], 0.5 / told["seconds"])
 
 
-def test_nothing_is_overwritten_without_force(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert call("run", scenario, "--out", tmp_path / "out") == 0
-    capsys.readouterr()
-    assert call("run", scenario, "--out", tmp_path / "out") == 2
-    path = tmp_path / "out" / "recording.parquet"
-    assert capsys.readouterr() == ("", f"cosim: {path} exists already; give --force to overwrite it.\n")
-    assert call("run", scenario, "--out", tmp_path / "out", "--force", "--interpreted") == 0
+def test_nothing_is_overwritten_without_force(scenario: Path, refused: Refused, capsys: Any) -> None:
+    assert call("run", scenario, "--out", "out") == 0
+    said = "cosim: out/recording.parquet exists already; give --force to overwrite it.\n"
+    assert refused("run", scenario, "--out", "out") == said
+    assert call("run", scenario, "--out", "out", "--force", "--interpreted") == 0
     assert "It was asked for: the loop ran in Python." in capsys.readouterr().err
 
 
@@ -57,45 +49,34 @@ CARD = 'stop = 1.0\n[components.plant]\ncard = "none"\npart = "plant"\n[record]\
         ("card.toml", 'card.toml: components.plant.card = "none": no such card; a card is a .toml file or one of: '),
     ],
 )
-def test_a_mistake_is_one_sentence_and_exit_code_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str, sentence: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_mistake_is_one_sentence_and_exit_code_2(refused: Refused, name: str, sentence: str) -> None:
     Path("card.toml").write_text(CARD)
-    assert call("run", name, "--out", "out") == 2
-    said = capsys.readouterr()
-    assert said.err.startswith(f"cosim: {sentence}")
-    assert (said.err.count("\n"), said.out) == (1, "")
+    said = refused("run", name, "--out", "out")
+    assert said.startswith(f"cosim: {sentence}")
+    assert said.count("\n") == 1
     assert not Path("out").exists()
     with pytest.raises(ScenarioError):
-        main(["run", "none.toml", "--out", str(tmp_path), "--debug"])
+        main(["run", name, "--out", "out", "--debug"])
 
 
-def test_a_failing_component_leaves_what_was_recorded(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_failing_component_leaves_what_was_recorded(scenario: Path, refused: Refused) -> None:
     scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3"))
-    assert call("run", scenario, "--out", tmp_path / "out") == 2
-    path = tmp_path / "out" / "recording.parquet"
-    note, sentence = capsys.readouterr().err.splitlines()[-2:]
-    assert note == f"what was recorded until then is in {path}"
+    note, sentence = refused("run", scenario, "--out", "out").splitlines()[-2:]
+    assert note == "what was recorded until then is in out/recording.parquet"
     assert sentence.startswith('cosim: controller returned an error at tick 300 (0.3 s); it said "the shaft broke"; ')
-    assert len(Recording.read(path)) == 151
+    assert len(Recording.read("out/recording.parquet")) == 151
 
 
 def test_an_fmu_that_prints_does_not_spoil_the_data(scenario: Path, tmp_path: Path) -> None:
     scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3, status = 13"))
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), "--json"]
-    done = subprocess.run(command, env=ENVIRONMENT, cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = python("-m", "cosim", "run", str(scenario), "--out", "out", "--json", folder=tmp_path)
     assert json.loads(done.stdout)["steps"] == 500
     assert done.stderr.count("chatter") == 200
 
 
 def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    scenario: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import cosim.cli.run
-
     told: list[str] = []
     with monkeypatch.context() as clock:
         clock.setattr(cosim.cli.run, "perf_counter", iter([45.0, 45.01, 2.0, 4.0]).__next__)
@@ -107,35 +88,29 @@ def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
         progress(2000, 7_201_000)
     assert told == ["about 4 h to go; the recording grows to 2 GB"]
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e12"))
-    assert call("run", scenario, "--out", tmp_path / "out") == 2
-    assert "PB are needed and " in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    assert "PB are needed and " in refused("run", scenario, "--out", "out")
+    assert not Path("out").exists()
 
 
-def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(
-    tmp_path: Path, cache: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert call("run", "sidereal", "--out", tmp_path / "a") == 0
-    assert "building the FMU of the plant of paper_mount" in capsys.readouterr().err
+def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(cache: Path, capsys: Any) -> None:
+    for name, built in (("a", True), ("b", False)):
+        assert call("run", "sidereal", "--out", name) == 0
+        assert ("building the FMU of the plant of paper_mount" in capsys.readouterr().err) == built
     assert len(list(cache.iterdir())) == 2
-    assert call("run", "sidereal", "--out", tmp_path / "b") == 0
-    assert "building" not in capsys.readouterr().err
-    one, other = (Recording.read(tmp_path / name / "recording.parquet") for name in "ab")
+    one, other = (Recording.read(f"{name}/recording.parquet") for name in "ab")
     error = (one["q_d"] - one["position"])[25_000:] * 648000 / np.pi
     assert np.abs(error).max() < 0.1  # arcsec; matched compensation: the paper's C2a without its disturbances
     for name in one:
         np.testing.assert_array_equal(one[name], other[name])
 
 
-def test_export_writes_plant_and_controller_for_both_versions(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert call("export", "paper_mount", "--out", tmp_path, "--json") == 0
+def test_export_writes_plant_and_controller_for_both_versions(refused: Refused, capsys: Any) -> None:
+    assert call("export", "paper_mount", "--out", "out", "--json") == 0
     parts = [f"paper_mount_{part}_fmi{version}.fmu" for part in ("plant", "controller") for version in (2, 3)]
-    assert json.loads(capsys.readouterr().out) == {"fmus": [str(tmp_path / part) for part in parts]}
-    assert call("export", "paper_mount", "--out", tmp_path, "--fmi", "3") == 2
-    assert "exists already; give --force to overwrite it." in capsys.readouterr().err
-    assert call("export", "none", "--out", tmp_path) == 2
+    assert json.loads(capsys.readouterr().out) == {"fmus": [f"out/{part}" for part in parts]}
+    said = refused("export", "paper_mount", "--out", "out", "--fmi", "3")
+    assert "exists already; give --force to overwrite it." in said
+    refused("export", "none", "--out", "out")
 
 
 @pytest.mark.parametrize(
@@ -149,15 +124,14 @@ def test_export_writes_plant_and_controller_for_both_versions(
         ("run.csv", ["rows: 200", "rate: 1000 Hz", "least", "gaps: 0"]),
     ],
 )
-def test_show_tells_what_a_file_is(
-    scenario: Path, tiny: dict[int, Path], capsys: pytest.CaptureFixture[str], what: str, words: list[str]
-) -> None:
-    files = {"loop.toml": scenario, "tiny3.fmu": tiny[3], "run.csv": scenario.with_name("run.csv")}
-    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write(files["run.csv"])
-    assert call("show", files.get(what, what)) == 0
+@pytest.mark.usefixtures("scenario")
+def test_show_tells_what_a_file_is(tiny: dict[int, Path], capsys: Any, what: str, words: list[str]) -> None:
+    file = {"tiny3.fmu": tiny[3]}.get(what, what)
+    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write("run.csv")
+    assert call("show", file) == 0
     shown = capsys.readouterr().out
     assert [word for word in words if word not in shown] == []
-    assert call("show", files.get(what, what), "--json") == 0
+    assert call("show", file, "--json") == 0
     json.loads(capsys.readouterr().out)
 
 
@@ -171,19 +145,15 @@ def test_show_tells_what_a_file_is(
         ("odd.xyz", "x", "is of no known kind, .xyz; known are: .csv, "),
     ],
 )
-def test_show_says_what_it_cannot_show(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str | None, sentence: str
-) -> None:
+def test_show_says_what_it_cannot_show(refused: Refused, name: str, text: str | None, sentence: str) -> None:
     if text is not None:
-        (tmp_path / name).write_text(text)
-    assert call("show", tmp_path / name) == 2
-    assert sentence in capsys.readouterr().err
+        Path(name).write_text(text)
+    assert sentence in refused("show", name)
 
 
-def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call("dance") == 2
-    assert call("run") == 2
-    capsys.readouterr()
+def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(refused: Refused, capsys: Any) -> None:
+    refused("dance")
+    refused("run")
     assert call("--help") == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("export", "run", "show", "--install-completion"))

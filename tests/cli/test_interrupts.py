@@ -2,7 +2,6 @@
 
 import errno
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import ENVIRONMENT, call
+from commands import call, python
 
 from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
@@ -122,8 +121,7 @@ builtins.__import__ = come
 from cosim.cli import main
 main()
 """
-    command = [sys.executable, "-c", start, "export", "paper_mount", "--out", "out"]
-    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, timeout=120)
+    done = python("-c", start, "export", "paper_mount", "--out", "out", folder=tmp_path)
     assert (done.returncode, done.stderr) == (143, "cosim: terminated\n")
     assert not [one for one in tmp_path.rglob("*") if one.is_file()]
 
@@ -162,8 +160,7 @@ FINALIZED, ASKED = "Last()", 'ca.fmax(ca.SX.sym("x"), Shaped())'
 
 def ended(what: str, comes: str, seconds: float) -> tuple[int, str]:
     """Run a verb in which something comes while an object is finalized, or while CasADi asks one for its shape."""
-    command = [sys.executable, "-c", PROGRAM.format(what=what, comes=comes, seconds=seconds)]
-    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    done = python("-c", PROGRAM.format(what=what, comes=comes, seconds=seconds))
     return done.returncode, done.stderr
 
 

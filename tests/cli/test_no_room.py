@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from commands import ENVIRONMENT, cache, call
+from commands import ENVIRONMENT, Refused, cache
 from on_hardware import SCENARIO
 
 from cosim.data.recording import Recording
@@ -35,10 +35,9 @@ def room(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def sentence(capsys: pytest.CaptureFixture[str]) -> str:
-    said = [one for one in capsys.readouterr().err.splitlines() if one.startswith("cosim: ")]
-    assert len(said) == 1
-    return said[0]
+def sentence(said: str) -> str:
+    (one,) = [line for line in said.splitlines() if line.startswith("cosim: ")]
+    return one
 
 
 def left(folder: Path) -> list[str]:
@@ -46,80 +45,68 @@ def left(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("isolate", ["--isolate", "--no-isolate"])
-def test_a_run_without_room_for_its_recording_leaves_nothing(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], isolate: str
-) -> None:
-    before = left(tmp_path)
+def test_a_run_without_room_for_its_recording_leaves_nothing(scenario: Path, refused: Refused, isolate: str) -> None:
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 50.0"))
     with room(70_000):  # more than the board of a process, less than the recording
-        long = scenario.with_name("long.toml")
-        long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 50.0"))
-        assert call("run", long, "--out", tmp_path / "out", isolate) == 2
-    assert "file too large" in sentence(capsys).lower()
-    assert left(tmp_path) == sorted([*before, "long.toml"])
+        assert "file too large" in sentence(refused("run", scenario, "--out", "out", isolate)).lower()
+    assert left(Path()) == ["loop.toml"]
 
 
 def test_a_run_without_room_for_temporary_files_says_so(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    scenario: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (temporary := tmp_path / "tmp").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    Path("tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", "tmp")
     with room(10_000):
-        assert call("run", scenario, "--out", tmp_path / "out") == 2
-    assert "file too large" in sentence(capsys).lower()
-    assert [one for one in left(tmp_path) if one.startswith(("tmp/", "out/"))] == []
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
-    assert call("run", scenario, "--out", tmp_path / "out") == 2
-    assert "no such file or directory" in sentence(capsys)
+        assert "file too large" in sentence(refused("run", scenario, "--out", "out")).lower()
+    assert left(Path()) == ["loop.toml"]
+    monkeypatch.setattr(tempfile, "tempdir", "nowhere")
+    assert "no such file or directory" in sentence(refused("run", scenario, "--out", "out"))
 
 
 def test_a_machine_without_room_for_its_black_box_does_not_start(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.undo()  # the FMUs of the usual cache
     (tmp_path / "s.toml").write_text(SCENARIO)
     with room(1_000_000):
-        assert call("hardware", "run", tmp_path / "s.toml", "--fast", "--out", tmp_path / "out") == 2
-    assert "file too large" in sentence(capsys).lower()
+        said = refused("hardware", "run", tmp_path / "s.toml", "--fast", "--out", tmp_path / "out")
+    assert "file too large" in sentence(said).lower()
     assert left(tmp_path) == ["s.toml"]
 
 
 @pytest.mark.parametrize("out", [f"/tmp/{LONG}", "/sys/cosim/out", "/dev/null/out", "/proc/self/cosim"])
 @pytest.mark.parametrize("verb", ["run", "export"])
-def test_a_place_that_cannot_be_is_one_sentence(
-    scenario: Path, capsys: pytest.CaptureFixture[str], verb: str, out: str
-) -> None:
-    assert call(verb, {"run": scenario, "export": "paper_mount"}[verb], "--out", out) == 2
-    assert out[:20] in sentence(capsys)
+def test_a_place_that_cannot_be_is_one_sentence(scenario: Path, refused: Refused, verb: str, out: str) -> None:
+    what = {"run": scenario, "export": "paper_mount"}[verb]
+    assert out[:20] in sentence(refused(verb, what, "--out", out))
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        ("run", LONG, "--out", "OUT"),
-        ("run", f"{LONG}.toml", "--out", "OUT"),
+        ("run", LONG, "--out", "out"),
+        ("run", f"{LONG}.toml", "--out", "out"),
         ("show", LONG),
         ("show", f"{LONG}.csv"),
         ("show", f"{LONG}.fmu"),
         ("show", f"{LONG}.ssp"),
         ("show", f"{LONG}.toml"),
-        ("export", f"{LONG}.toml", "--out", "OUT"),
-        ("identify", f"{LONG}.csv", "--card", "paper_mount", "--out", "OUT"),
-        ("diagnose", f"{LONG}.csv", "--heldout", f"{LONG}.csv", "--card", "paper_mount", "--out", "OUT"),
-        ("sweep", f"{LONG}.toml", "--out", "OUT"),
+        ("export", f"{LONG}.toml", "--out", "out"),
+        ("identify", f"{LONG}.csv", "--card", "paper_mount", "--out", "out"),
+        ("diagnose", f"{LONG}.csv", "--heldout", f"{LONG}.csv", "--card", "paper_mount", "--out", "out"),
+        ("sweep", f"{LONG}.toml", "--out", "out"),
         ("hardware", "replay", f"{LONG}.parquet"),
-        ("hardware", "run", f"{LONG}.toml", "--out", "OUT"),
+        ("hardware", "run", f"{LONG}.toml", "--out", "out"),
         ("hardware", "check", "sidereal", "--machine", f"{LONG}.toml"),
         ("hardware", "virtual-drive", "paper_mount", "--port", "0", "--key", LONG),
         ("hardware", "virtual-drive", LONG),
     ],
     ids=lambda command: " ".join(one[:9] for one in command),
 )
-def test_a_name_that_is_too_long_is_one_sentence(
-    command: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert call(*(str(tmp_path / "out") if one == "OUT" else one for one in command)) == 2
-    assert len(sentence(capsys)) < 1500
-    assert left(tmp_path) == []
+def test_a_name_that_is_too_long_is_one_sentence(command: tuple[str, ...], refused: Refused) -> None:
+    assert len(sentence(refused(*command))) < 1500
+    assert left(Path()) == []
 
 
 @pytest.mark.parametrize(
@@ -137,15 +124,11 @@ def test_a_name_that_is_too_long_is_one_sentence(
     ],
     ids=" ".join,
 )
-def test_an_empty_name_is_not_the_folder_that_one_stands_in(
-    command: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert call(*command) == 2
+def test_an_empty_name_is_not_the_folder_that_one_stands_in(command: tuple[str, ...], refused: Refused) -> None:
     place = next(k for k, one in enumerate(command) if not one.rpartition("=")[2].strip())
     name = "--out" if command[place] == "--out=" else command[place - 1]
-    assert sentence(capsys).startswith(f'cosim: {name} "')
-    assert list(tmp_path.iterdir()) == []
+    assert sentence(refused(*command)).startswith(f'cosim: {name} "')
+    assert list(Path().iterdir()) == []
 
 
 def in_c(*arguments: object) -> "subprocess.CompletedProcess[bytes]":
@@ -189,11 +172,11 @@ def test_a_standard_file_that_is_closed_or_full_is_no_traceback(
     assert bool(done.stdout) == (code == 0)
 
 
-def test_a_run_whose_standard_files_are_closed_records_whole(scenario: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+def test_a_run_whose_standard_files_are_closed_records_whole(scenario: Path) -> None:
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", "out"]
     shell = ["sh", "-c", 'exec "$@" <&- 2>&-', "sh", *command]
     assert subprocess.run(shell, env=ENVIRONMENT, check=False, capture_output=True).returncode == 0
-    assert len(Recording.read(tmp_path / "out" / "recording.parquet")) == 250
+    assert len(Recording.read("out/recording.parquet")) == 250
 
 
 def test_what_the_system_refuses_is_a_sentence_with_its_culprit() -> None:

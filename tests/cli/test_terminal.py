@@ -1,14 +1,12 @@
 """The command line meets a slip half way, says how far it is, takes other numbers, and finds a folder for results."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from commands import call
+from commands import Refused, call, python
 
 import cosim
 from cosim.support.errors import InputError, UndecidedError
@@ -17,11 +15,6 @@ from cosim.support.terminal import stage
 from pyfmi_models.near import near as near_of_physics
 
 CARD = '[mount]\ninertia = 3.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
-
-
-def said(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    assert call(*words) == 2
-    return " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(
@@ -35,11 +28,9 @@ def said(capsys: pytest.CaptureFixture[str], *words: object) -> str:
         ("hardware chek", "'check'"),
     ],
 )
-def test_a_name_or_a_verb_that_was_nearly_hit_is_suggested(
-    capsys: pytest.CaptureFixture[str], words: str, meant: str
-) -> None:
-    assert f"Did you mean {meant}?" in said(capsys, *words.split())
-    assert "a:smile:b" in said(capsys, "show", "a:smile:b"), "what looks like an emoji is said as it was given"
+def test_a_name_or_a_verb_that_was_nearly_hit_is_suggested(refused: Refused, words: str, meant: str) -> None:
+    assert f"Did you mean {meant}?" in " ".join(refused(*words.split()).split())
+    assert "a:smile:b" in refused("show", "a:smile:b"), "what looks like an emoji is said as it was given"
 
 
 @pytest.mark.parametrize(
@@ -56,12 +47,9 @@ def test_a_name_or_a_verb_that_was_nearly_hit_is_suggested(
         (CARD + '[[effects]]\neffect = "coging"\n', 'Did you mean "cogging"?'),
     ],
 )  # fmt: skip
-def test_a_misspelt_key_is_named_before_the_one_that_is_then_missing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, sentence: str
-) -> None:
-    path = tmp_path / "axis.toml"
-    path.write_text(text)
-    assert sentence in said(capsys, "show", path)
+def test_a_misspelt_key_is_named_before_one_that_is_then_missing(refused: Refused, text: str, sentence: str) -> None:
+    Path("axis.toml").write_text(text)
+    assert sentence in " ".join(refused("show", "axis.toml").split())
 
 
 def test_a_suggestion_is_made_once_and_only_where_something_is_alike() -> None:
@@ -88,11 +76,8 @@ def test_the_runner_and_the_physics_suggest_alike() -> None:
     ],
 )
 def test_a_shell_completes_verbs_options_and_shipped_names(line: str, offered: str) -> None:
-    words = line.split()
-    ask = {"_COSIM_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    command = [sys.executable, "-m", "cosim"]
-    done = subprocess.run(command, env=os.environ | ask, capture_output=True, text=True, check=False)
-    assert offered in done.stdout.split()
+    ask = {"_COSIM_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+    assert offered in python("-m", "cosim", **ask).stdout.split()
 
 
 def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
@@ -105,16 +90,11 @@ def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.Capt
 # A run with other numbers, results without a folder that was given, an answer that begins with the axis.
 
 
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def test_numbers_are_changed_for_one_run_and_the_recording_says_so(scenario: Path, tmp_path: Path) -> None:
+def test_numbers_are_changed_for_one_run_and_the_recording_says_so(scenario: Path) -> None:
     text = scenario.read_text().replace("k = 5.0", "k = 7.0").replace("frequency = 2.0", "frequency = 3.0")
-    (other := tmp_path / "other.toml").write_text(text)
+    Path("other.toml").write_text(text)
     asked = cosim.run(scenario, set={"controller.k": 7.0, "r.frequency": 3.0}).recording
-    for name, values in cosim.run(other).recording.table.items():
+    for name, values in cosim.run("other.toml").recording.table.items():
         assert np.array_equal(values, asked[name]), name
 
 
@@ -128,26 +108,21 @@ def test_the_command_takes_several_numbers_and_a_stop(scenario: Path, capsys: py
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--set", "controller.kk=7"], '"controller.kk" is nothing that can be set; of controller can be set: '),
-        (["--set", "rest.k=7"], "there are: plant, controller, r, n."),
-        (["--set", "controller.k"], '--set "controller.k": write component.parameter=value.'),
-        (["--set", "controller.k=soft"], "--set controller.k=soft: it must be a number, true or false."),
-        (["--set", "controller.k=1", "--set", "controller.k=2"], "--set controller.k is given twice"),
-        (["--stop", "0.2505"], "stop = 0.2505 is not a whole number of steps of 0.001 s."),
-        (["--stop", "-1"], "stop = -1 must be above 0 s."),
+        ("--set controller.kk=7", '"controller.kk" is nothing that can be set; of controller can be set: '),
+        ("--set rest.k=7", "there are: plant, controller, r, n."),
+        ("--set controller.k", '--set "controller.k": write component.parameter=value.'),
+        ("--set controller.k=soft", "--set controller.k=soft: it must be a number, true or false."),
+        ("--set controller.k=1 --set controller.k=2", "--set controller.k is given twice"),
+        ("--stop 0.2505", "stop = 0.2505 is not a whole number of steps of 0.001 s."),
+        ("--stop -1", "stop = -1 must be above 0 s."),
     ],
 )
-def test_what_cannot_be_set_is_one_sentence(
-    scenario: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
-) -> None:
-    assert call("run", scenario, *arguments, "--out", "out") == 2
-    assert sentence in capsys.readouterr().err
+def test_what_cannot_be_set_is_one_sentence(scenario: Path, refused: Refused, arguments: str, sentence: str) -> None:
+    assert sentence in refused("run", scenario, *arguments.split(), "--out", "out")
     assert not Path("out").exists()
 
 
-def test_results_without_a_folder_get_one_of_their_own_which_is_said(
-    scenario: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_without_a_folder_get_one_of_their_own_which_is_said(scenario: Path, capsys: Any) -> None:
     for number in (1, 2):
         assert call("run", scenario, "--no-page") == 0
         said = capsys.readouterr()
@@ -171,16 +146,15 @@ def test_results_without_a_folder_get_one_of_their_own_which_is_said(
     ],
 )
 @pytest.mark.usefixtures("scenario")
-def test_where_results_go_is_not_said_of_what_is_refused(arguments: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_results_go_is_not_said_of_what_is_refused(arguments: str, refused: Refused) -> None:
     Path("bad.toml").write_text("[mount]\n")
     Path("run.csv").write_text("t,q\n0,1\n")
     Path("short.csv").write_text("t,q,tau\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(20)))
-    assert call(*arguments.split()) == 2
-    assert "results go to" not in capsys.readouterr().err
+    assert "results go to" not in refused(*arguments.split())
 
 
-def test_the_answer_begins_with_how_well_the_axis_followed(scenario: Path, tmp_path: Path) -> None:
-    done = cosim.run(scenario, tmp_path / "out", page=False)
+def test_the_answer_begins_with_how_well_the_axis_followed(scenario: Path) -> None:
+    done = cosim.run(scenario, "out", page=False)
     (axis,) = done.statistics["tracking"]
     error = done.recording["q_d"] - done.recording["q"]
     assert axis["rms"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
@@ -188,13 +162,13 @@ def test_the_answer_begins_with_how_well_the_axis_followed(scenario: Path, tmp_p
     assert str(done).startswith(f"loop: RMS tracking error {axis['statement'].split()[3]} ")
 
 
-def test_a_sweep_is_called_from_python_and_tells_its_best_run(scenario: Path, tmp_path: Path) -> None:
+def test_a_sweep_is_called_from_python_and_tells_its_best_run(scenario: Path) -> None:
     cosim.run(scenario)  # it loads what sweeps are made of, and `cosim.sweep` is a function still
-    (tmp_path / "many.toml").write_text(
+    Path("many.toml").write_text(
         'scenario = "loop.toml"\n[vary]\n"controller.k" = [1.0, 5.0, 3.0]\n'
         '[statistics]\nerror = { signal = "r.position", minus = "plant.y", kind = "rms" }\n'
     )
-    found = cosim.sweep(tmp_path / "many.toml", tmp_path / "many", workers=1)
+    found = cosim.sweep("many.toml", "many", workers=1)
     table = found.frame()
     best = table.loc[table["error"].idxmin()]  # type: ignore[attr-defined]
     assert found.best == {"run": best["run"], "controller.k": best["controller.k"], "error": best["error"]}

@@ -1,13 +1,18 @@
-"""What is printed is what is delivered: the written card is read back, and every number of the JSON computed again."""
+"""What is printed is what is delivered: the card is read back, numbers computed again; files of 0.1.0 are read."""
 
 import json
 import re
 from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
+import cosim
+from cosim.api.why import read_ledger
 from cosim.data.recording import Recording
 from cosim.delivery.deliver import deliver_quickly
 from cosim.diagnosis.diagnose import _problem, diagnose
@@ -16,6 +21,7 @@ from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.estimation.fit import free_parameters, with_values
 from cosim.estimation.prepare import Band, prepare
 from cosim.estimation.residuals import residuals
+from cosim.support.errors import InputError
 from cosim.support.statistics import rms
 from cosim_studies.proof.generator import make_case, to_toml
 from pyfmi_models.card import Card, parse_card, read_card
@@ -163,3 +169,29 @@ def in_model(delivered: Delivered) -> list[dict[str, Any]]:
 
 def energy(weight: np.ndarray, residual: np.ndarray) -> float:
     return float(np.sum((weight * residual) ** 2))
+
+
+OLD = Path(__file__).with_name("of_0_1_0")
+"""What `cosim demo` of version 0.1.0 wrote, with four of its effects."""
+
+
+def test_card_and_diagnosis_of_0_1_0_are_read_and_shown_and_a_missing_ledger_is_one_sentence() -> None:
+    written = json.loads((OLD / "diagnosis.json").read_text("utf-8"))
+    schema = json.loads((files("cosim.delivery") / "schema.json").read_text("utf-8"))
+    card = read_card(OLD / "card.toml")
+    assert card.origin is not None
+    assert card.origin["version"] == "0.1.0"
+    assert [one.id for one in card.plant().effects] == ["friction_asymmetry", "cogging"]
+    assert card.plant().model().parameters
+    assert (written["version"], written["policy"]) == ("0.1.0", "evidence 2")
+    Draft202012Validator(schema).validate(written)
+    shown = cosim.show(OLD)
+    assert shown.facts["missing"] == "friction_asymmetry, cogging"
+    assert {row["effect"]: row["answer"] for row in shown.tables["effects"]} == {
+        "friction_asymmetry": "detected",
+        "cogging": "detected",
+        "presliding": "not testable",
+        "backlash": "not detected",
+    }
+    with pytest.raises(InputError, match=r"diagnosis.json holds no ledger; .* a version before 0\.2\. Diagnose again"):
+        read_ledger(OLD)

@@ -1,15 +1,13 @@
 """docs/adding_physics.md holds: its three files in a copy of the packages make a law and an effect, nothing else."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import python
 from fmpy import simulate_fmu
 from wandering import swing
 
@@ -47,16 +45,13 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 
 
-def own_files() -> list[str]:
-    """The blocks that are files of the packages."""
-    return [block for block in blocks("python") if block.startswith(("# pyfmi_models/", "# cosim/"))]
+OWN_FILES = [block for block in blocks("python") if block.startswith(("# pyfmi_models/", "# cosim/"))]
+"""The blocks that are files of the packages."""
 
 
 def run(folder: Path, *arguments: str, own: bool = True) -> str:
     """What Python prints in a folder, with the packages of the folder or those that are installed."""
-    environment = os.environ | ({"PYTHONPATH": str(folder)} if own else {})
-    command = [sys.executable, *arguments]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    done = python(*arguments, folder=folder, **({"PYTHONPATH": str(folder)} if own else {}))
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -68,7 +63,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for package in (pyfmi_models, cosim):
         source = Path(str(package.__file__)).parent
         shutil.copytree(source, folder / source.name)  # with what is compiled: each command would do it again
-    for block in own_files():
+    for block in OWN_FILES:
         name = block.partition("\n")[0].removeprefix("# ")
         assert not (folder / name).exists()
         (folder / name).write_text(block, "utf-8")
@@ -126,7 +121,7 @@ def test_a_diagnosis_finds_the_effect_in_recordings(copy: Path) -> None:
 
 def test_the_same_files_in_a_folder_of_their_own_pass_the_checks(tmp_path: Path) -> None:
     (mine := tmp_path / "mine").mkdir()
-    for block in own_files():
+    for block in OWN_FILES:
         path = Path(block.partition("\n")[0].removeprefix("# "))
         name = f"{path.stem}_hypothesis.py" if "diagnosis" in path.parts else path.name
         (mine / name).write_text(block.replace("pyfmi_models.effects.wind_load", "wind_load"), "utf-8")

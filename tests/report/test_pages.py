@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from browsing import DESK, PHONE, VIEWS, browser, check_by_axe, opened
+from browsing import DESK, VIEWS, browser, check_by_axe, opened, unfolded
 from commands import call
 from hypothesis import given, settings
 from hypothesis import strategies as some
@@ -40,12 +40,6 @@ def of_fmu(part: str = "plant") -> str:
     card = read_card("paper_mount")
     model = card.plant().model() if part == "plant" else card.controller_model()
     return documentation(generate(model), ("x86_64-linux",))["documentation/index.html"].decode()
-
-
-@pytest.fixture
-def of_run(scenario: Path, tmp_path: Path) -> str:
-    call("run", scenario, "--out", tmp_path / "out")
-    return (tmp_path / "out" / "run.html").read_text("utf-8")
 
 
 def of_story(folder: Path, linear: bool = False) -> str:
@@ -78,13 +72,6 @@ def test_the_page_of_an_investigation_has_units_and_12_px_on_a_phone_a_diagram_9
     assert 13 * min(1, int(least) / int(width)) >= 9
 
 
-def test_the_page_of_a_run_has_plain_words_and_keeps_12_px_on_a_phone(of_run: str) -> None:
-    assert re.search(r"rows, one (each step|in [2-9]\d* steps)\.", of_run)
-    width = float(re.findall(r'viewBox="0 0 (\d+) ', of_run)[0])
-    size = float(re.findall(r"svg \{[^}]*font-size: ([\d.]+)px", of_run)[0])
-    assert size * (390 - 2 * 16) / width >= 12
-
-
 def test_time_to_go_is_told_when_the_speed_is_known_and_not_before() -> None:
     now = [0.0]
     shown = bar(console=Console(quiet=True), get_time=lambda: now[0], auto_refresh=False)
@@ -98,51 +85,49 @@ def test_time_to_go_is_told_when_the_speed_is_known_and_not_before() -> None:
     assert Left().render(shown.tasks[0]).plain == ""
 
 
-LOOKED_AT = [("two", "rotary", VIEWS), ("none", "rotary", VIEWS[:1]), ("unknown", "rotary", VIEWS[2:])]
-"""Styles and widths are those of one template: each way of looking at one report, each other report in one way."""
-
-
-@pytest.mark.parametrize(("kind", "motion", "views"), [*LOOKED_AT, ("two", "linear", VIEWS[1:2])])
-def test_axe_finds_nothing_in_a_report_on_a_desk_on_a_phone_or_in_the_dark(
-    browser: Any, kind: str, motion: str, views: Any, tmp_path: Path
-) -> None:
-    check_by_axe(browser, report_of(kind, motion), tmp_path, views)
-
-
-@pytest.mark.parametrize("what", ["plant", "controller", "run", "investigation"])
-def test_axe_finds_nothing_in_other_pages(
-    browser: Any, what: str, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
-    made = {"run": lambda: request.getfixturevalue("of_run"), "investigation": lambda: of_story(tmp_path)}
-    check_by_axe(browser, made.get(what, lambda: of_fmu(what))(), tmp_path)
-
-
 LEAST = """Math.min(...[...document.querySelectorAll("svg")].filter((one) => one.clientWidth).map(
     (one) => (12.5 * one.clientWidth) / one.viewBox.baseVal.width))"""
 """Pixels of the smallest text of a picture."""
+DRAWN = """window.told = []; const fill = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  window.told.push([text, this.textAlign, y]); return fill.call(this, text, x, y); }; 0"""
 
 
 @pytest.mark.parametrize(
-    ("kind", "motion", "size"), [("two", "rotary", DESK), ("unknown", "rotary", PHONE), ("two", "linear", PHONE)]
-)
+    ("kind", "motion", "views"),
+    [
+        ("two", "rotary", VIEWS),
+        ("none", "rotary", VIEWS[:1]),
+        ("unknown", "rotary", VIEWS[1:]),
+        ("two", "linear", VIEWS[1:2]),
+    ],
+)  # styles and widths are those of one template: each way of looking at one report, others in one way
 def test_a_report_is_shown_without_complaint(
-    browser: Any, kind: str, motion: str, size: dict[str, int], tmp_path: Path
+    browser: Any, kind: str, motion: str, views: tuple[Any, ...], tmp_path: Path
 ) -> None:
-    """It fits the screen, texts have 12 px, and the explorer has three ticks on each side."""
+    """It fits the screen, texts have 12 px, the explorer has three ticks on each side, axe finds nothing."""
     (tmp_path / "report.html").write_text(report_of(kind, motion), "utf-8")
-    with opened(browser, (tmp_path / "report.html").as_uri(), size) as page:
+    with opened(browser, (tmp_path / "report.html").as_uri(), views[0][0]) as page:
         page.wait_for_function("document.getElementById('explorer').dataset.ready === 'yes'")
-        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
-        assert page.evaluate(LEAST) >= 12
-        page.evaluate(
-            "window.told = []; const fill = CanvasRenderingContext2D.prototype.fillText;"
-            "CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {"
-            "  window.told.push([text, this.textAlign, y]); return fill.call(this, text, x, y); }; 0"
-        )
+        for size, _ in views:
+            page.set_viewport_size(size)
+            assert page.evaluate(LEAST) >= 12
+        page.evaluate(DRAWN)
         told = page.evaluate("(document.querySelector('[data-to=all]').click(), window.told)")
+        unfolded(page, views)
     titles = [at for at, (_, align, _) in enumerate(told) if align == "left"]
     before = [told[low:high] for low, high in zip([0, *(at + 1 for at in titles)], titles, strict=False)]
     assert [len(part) >= 3 for part in before] == [True, True, True]
+
+
+@pytest.mark.parametrize("what", ["plant", "controller", "run", "investigation"])
+def test_axe_finds_nothing_in_other_pages(browser: Any, what: str, scenario: Path, tmp_path: Path) -> None:
+    if what == "run":
+        call("run", scenario, "--out", tmp_path)
+        html = (tmp_path / "run.html").read_text("utf-8")
+    else:
+        html = of_story(tmp_path) if what == "investigation" else of_fmu(what)
+    check_by_axe(browser, html, tmp_path)
 
 
 def test_no_printed_page_holds_a_single_row(browser: Any, tmp_path: Path) -> None:
@@ -249,6 +234,13 @@ def test_a_chart_draws_what_it_is_given_where_it_belongs_and_logarithmic_ticks_a
     assert drawn.get("aria-label") == "a < b"
 
 
+def page_of(folder: Path, *recorded: Any) -> str:
+    """The page of a run of which a table, units and an origin were recorded."""
+    Recording("run", *recorded).write(folder / "run.parquet")
+    scenario = parse_scenario(TEXT, "loop.toml", Path())
+    return write_run(folder / "run.html", folder / "run.parquet", scenario, STATISTICS).read_text("utf-8")
+
+
 @pytest.fixture
 def page(tmp_path: Path) -> str:
     t = np.arange(1000) * 1e-3
@@ -257,9 +249,7 @@ def page(tmp_path: Path) -> str:
     units = {"t": "s", "q_d": "rad", "q": "rad", "v": "rad/s", "tau": "N.m", "friction": "N.m"}
     component = {"file": "x.fmu", "fmi": "3.0", "tool": "a tool", "sha256": "0123456789abcdef", "parameters": {"k": 2}}
     origin = {"version": "mount-cosim 1", "command": "cosim run x", "decimation": 1, "components": {"plant": component}}
-    Recording("run", table, units, origin).write(tmp_path / "run.parquet")
-    scenario = parse_scenario(TEXT, "loop.toml", Path())
-    return write_run(tmp_path / "run.html", tmp_path / "run.parquet", scenario, STATISTICS).read_text("utf-8")
+    return page_of(tmp_path, table, units, origin)
 
 
 def test_a_page_has_every_picture_says_what_ran_leads_with_the_error_and_needs_nothing_from_outside(page: str) -> None:
@@ -297,7 +287,7 @@ def test_a_page_has_every_picture_says_what_ran_leads_with_the_error_and_needs_n
     assert len(page) < 200_000
 
 
-def test_a_run_writes_its_page_unless_told_not_to(
+def test_a_run_writes_its_page_with_texts_of_12_px_on_a_phone_unless_told_not_to(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -306,17 +296,18 @@ def test_a_run_writes_its_page_unless_told_not_to(
     text = (out / "run.html").read_text("utf-8")
     assert "<h1>loop</h1>" in text
     assert "error" in re.findall(r'class="title">(\w+)', text)
+    assert re.search(r"rows, one (each step|in [2-9]\d* steps)\.", text)
+    width = float(re.findall(r'viewBox="0 0 (\d+) ', text)[0])
+    size = float(re.findall(r"svg \{[^}]*font-size: ([\d.]+)px", text)[0])
+    assert size * (390 - 2 * 16) / width >= 12
     assert call("run", scenario, "--out", tmp_path / "bare", "--no-page") == 0
     assert sorted(one.name for one in (tmp_path / "bare").iterdir()) == ["recording.parquet", "run.json"]
 
 
 @pytest.mark.parametrize("rows", [1, 2, 70])
 def test_short_and_constant_recordings_have_a_page_too(tmp_path: Path, rows: int) -> None:
-    table = {"t": np.arange(rows) * 1.0, "q_d": np.zeros(rows), "q": np.zeros(rows), "v": np.zeros(rows)}
-    origin = {"version": "mount-cosim 1", "decimation": 1}
-    Recording("run", table | {"friction": np.ones(rows)}, {}, origin).write(tmp_path / "run.parquet")
-    scenario = parse_scenario(TEXT, "loop.toml", Path())
-    text = write_run(tmp_path / "run.html", tmp_path / "run.parquet", scenario, STATISTICS).read_text("utf-8")
+    table = dict.fromkeys(("q_d", "q", "v"), np.zeros(rows)) | {"t": np.arange(rows) * 1.0, "friction": np.ones(rows)}
+    text = page_of(tmp_path, table, {}, {"version": "mount-cosim 1", "decimation": 1})
     assert "nan" not in "".join(re.findall(r'points="([^"]*)"', text))
 
 

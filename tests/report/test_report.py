@@ -2,8 +2,6 @@
 
 import base64
 import re
-import subprocess
-import sys
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +12,8 @@ import numpy as np
 import pytest
 from learned_told import TOLD
 from lxml import etree
-from report_example import FOUND, REST, RIVALS, diagnosis, report_of
+from report_example import FOUND, REST, RIVALS, diagnosis, report_of, text_of
 from report_example import report_of as page
-from report_text import text_of
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Where
 from cosim.diagnosis.effects import TRIED
@@ -159,11 +156,6 @@ def test_an_experiment_that_noise_would_hide_is_said_to_need_more_motion(differe
     html = render(replace(TWO, next_experiment=TWO.next_experiment | {"expected_difference": difference}))
     assert said in html
     assert ("Record motion that goes further or faster" in html) == (difference < 0.01)  # what the first table orders
-
-
-def test_importing_the_report_does_not_load_matplotlib() -> None:
-    code = "import cosim.report, cosim.report.terminal, sys; sys.exit('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_the_header_counts_what_was_recorded_and_not_what_was_judged() -> None:

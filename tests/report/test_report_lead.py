@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from learned_told import TOLD
-from report_example import FOUND, REST, RIVALS, diagnosis, report_of
-from report_text import text_of
+from report_example import FOUND, REST, RIVALS, diagnosis, report_of, text_of
 
 from cosim.delivery.deliver import chosen_of_sets
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Sanity, Where

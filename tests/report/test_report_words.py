@@ -9,8 +9,7 @@ from typing import Any, get_args
 import pytest
 from effect_examples import EXAMPLES
 from plain_words import unplain
-from report_example import FOUND, REST, RIVALS, diagnosis, report_of
-from report_text import text_of
+from report_example import FOUND, REST, RIVALS, diagnosis, report_of, text_of
 
 from cosim.api.show import show
 from cosim.delivery.deliver import as_json, without_files

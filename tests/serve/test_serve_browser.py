@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import serve_work
-from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
+from browsing import DESK, PATIENCE, PHONE, browser, check_page, dropped, opened, processor
 from mortal import mortal
 from serving import CARD, HERE, TOKEN, client_of, desk_at, done, listened, recording  # skips without [serve]
 from serving import ready as draft
@@ -198,74 +198,40 @@ def to(page: Page, name: str) -> None:
     raise AssertionError(f"{name} is not reached by Tab")
 
 
-def test_it_fits_a_phone_and_everything_can_be_touched(browser: Any, files: list[Path], tmp_path: Path) -> None:
-    with (
-        serving(tmp_path / "data", serve_work.quickly) as (_, address),
-        opened(browser, address, PHONE, "dark") as page,
-    ):
-        check_phone(page)
-        ready(page, files)
-        for one in page.locator("summary").all():
-            one.click()
-        check_phone(page)
-        page.click("#start")
-        page.wait_for_selector("#report")
-        check_phone(page)
-        page.click("#to-all")
-        page.wait_for_selector(".jobs")
-        check_phone(page)
+LOW = """([least, what]) => [...document.querySelectorAll(what)]
+    .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < least)
+    .map((one) => one.outerHTML)"""
 
 
-def check_phone(page: Page) -> None:
-    # A selector may be there before the style sheet of a new page is.
-    page.wait_for_load_state("load")
-    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
-    low = page.evaluate(
-        """([least, what]) => [...document.querySelectorAll(what)]
-        .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < least)
-        .map((one) => one.outerHTML)""",
-        [TOUCH, "button, select, input:not([type=hidden]), textarea, summary, li a"],
-    )
-    assert low == []
+def check(page: Page) -> None:
+    """Axe finds nothing, nothing scrolls sideways, the dark is dark, and on a phone everything can be touched."""
+    check_page(page)
     red = int(page.evaluate("getComputedStyle(document.body).backgroundColor").partition("(")[2].partition(",")[0])
     assert red < 60
+    page.set_viewport_size(PHONE)
+    assert page.evaluate(LOW, [TOUCH, "button, select, input:not([type=hidden]), textarea, summary, li a"]) == []
+    page.set_viewport_size(DESK)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing(browser: Any, files: list[Path], tmp_path: Path, scheme: str) -> None:
-    code = axe_script()
+def test_every_page_is_read_and_used_by_everybody(browser: Any, files: list[Path], tmp_path: Path) -> None:
     (tmp_path / "open.csv").write_bytes((HERE / "samples" / "odrive.csv").read_bytes())
-    with (
-        serving(tmp_path / "data", serve_work.for_ever) as (desk, address),
-        opened(browser, address, DESK, scheme) as page,
-    ):
-        check_axe(page, code)
+    with serving(tmp_path / "data", serve_work.for_ever) as (_, address), opened(browser, address, DESK) as page:
+        check(page)
         page.set_input_files("#files", [*files, tmp_path / "open.csv"])
         page.wait_for_selector("#accept-3")
         for one in page.locator("summary").all():
             if one.is_visible():
                 one.click()
-        check_axe(page, code)
+        check(page)
         page.click("#start")
         page.wait_for_selector("#problem")
-        check_axe(page, code)
+        check(page)
         page.click("#drop-3")
         page.wait_for_selector("#drop-3", state="detached")
-        page.click("#start")
-        page.wait_for_selector("#first")
-        check_axe(page, code)
-        page.click("#cancel")
-        page.wait_for_selector("#again")
-        check_axe(page, code)
-        page.click("#to-all")
-        page.wait_for_selector(".jobs")
-        check_axe(page, code)
-        assert desk.store.all()
-
-
-def check_axe(page: Page, code: str) -> None:
-    page.wait_for_load_state("load")
-    assert violations(page, code) == []
+        for button, there in (("#start", "#first"), ("#cancel", "#again"), ("#to-all", ".jobs")):
+            page.click(button)
+            page.wait_for_selector(there)
+            check(page)
 
 
 def test_a_server_that_is_gone_is_said(browser: Any, files: list[Path], tmp_path: Path) -> None:
@@ -287,44 +253,35 @@ SMALL = """[...document.querySelectorAll("figure text")].filter(
 
 
 def test_two_diagnoses_are_chosen_in_the_history_and_compared(browser: Any, tmp_path: Path) -> None:
-    with desk_at(tmp_path / "data", serve_work.comparing) as desk, listened(desk) as port:
+    with serving(tmp_path / "data", serve_work.comparing) as (desk, address), opened(browser, address, DESK) as page:
         client = client_of(desk)
         for names in (("run1.csv", "heldout.csv"), ("run1.csv",)):
-            done(client, desk, draft(client, *names))
-        with opened(browser, f"http://127.0.0.1:{port}/?token={TOKEN}", DESK) as page:
-            for box in page.locator(".choose input").all():
-                box.check()
-            check(page)
-            page.click("#compare-two")
-            page.wait_for_selector("#pair")
-            page.click("#neither-summary")
-            assert page.locator("#pair thead th").count() == 2
-            check(page)
-
-
-def check(page: Any) -> None:
-    """Axe finds nothing, nothing scrolls sideways, and text in charts has 12 pixels: desk, phone, dark."""
-    page.wait_for_load_state("load")
-    for size, scheme in ((DESK, "dark"), (DESK, "light"), (PHONE, "light")):
-        page.set_viewport_size(size)
-        page.emulate_media(color_scheme=scheme)
-        assert page.evaluate("document.documentElement.scrollWidth") == size["width"]
-        assert page.evaluate(SMALL) == 0
-        assert violations(page, axe_script()) == []
-    page.set_viewport_size(DESK)
+            done(client, desk, job := draft(client, *names))
+        page.goto(address.partition("/?")[0] + job)
+        page.wait_for_selector("#report")
+        check(page)
+        page.click("#to-all")
+        page.wait_for_selector(".jobs")
+        for box in page.locator(".choose input").all():
+            box.check()
+        check(page)
+        page.click("#compare-two")
+        page.wait_for_selector("#pair")
+        page.click("#neither-summary")
+        assert page.locator("#pair thead th").count() == 2
+        check(page)
+        for size in (PHONE, DESK):
+            page.set_viewport_size(size)
+            assert page.evaluate(SMALL) == 0, "text in charts has 12 pixels"
 
 
 @pytest.mark.parametrize("zone", ["America/New_York", "Asia/Tokyo"])
 def test_times_are_those_of_the_readers_clock(browser: Any, tmp_path: Path, zone: str) -> None:
-    with desk_at(tmp_path / "data", serve_work.quickly) as desk, listened(desk) as port:
+    with serving(tmp_path / "data", serve_work.quickly) as (desk, address):
         job = desk.store.new()
         made = datetime.fromisoformat("2026-01-02T03:04:05+00:00")
         desk.store.put(job.id, made=made.isoformat())
-        context = browser.new_context(viewport=DESK, timezone_id=zone, locale="en-GB")
-        context.set_default_timeout(PATIENCE)
-        page = context.new_page()
-        page.goto(f"http://127.0.0.1:{port}/?token={TOKEN}")
-        page.wait_for_selector(".jobs time")
-        told = page.inner_text(".jobs time")
-        context.close()
+        with opened(browser, address, DESK, timezone_id=zone, locale="en-GB") as page:
+            page.wait_for_selector(".jobs time")
+            told = page.inner_text(".jobs time")
     assert told == {"America/New_York": "1 Jan 2026, 22:04", "Asia/Tokyo": "2 Jan 2026, 12:04"}[zone]

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from serving import CARD, act, done, id_of, new, put, ready, recording
+import serve_work
+from serving import CARD, act, desk_at, done, id_of, new, put, ready, recording
 from starlette.testclient import TestClient
 
 from cosim_serve.desk import Desk
@@ -73,20 +74,11 @@ def test_a_job_that_cannot_be_read_costs_itself_alone_and_can_be_removed(
     assert "use that version" in page.text or "Open it with that version, or remove it" in page.text
     assert act(client, job, "card", text=CARD).status_code == 400
     assert put(client, job, "a.csv", recording()).status_code == 400
+    with desk_at(desk.store.home, serve_work.quickly) as again:  # a server starts beside it
+        assert [one.id for one in again.store.all()] == [id_of(other)]
     assert act(client, job, "remove").status_code == 200
     assert "Unreadable" not in client.get("/").text
     assert not note(desk, job).parent.exists()
-
-
-def test_a_server_starts_beside_jobs_that_cannot_be_read(client: TestClient, desk: Desk) -> None:
-    jobs = [new(client) for _ in ABSURD]
-    for job, values in zip(jobs, ABSURD.values(), strict=True):
-        note(desk, job).write_bytes(altered(desk, job, **values))
-    good = ready(client)
-    done(client, desk, good)
-    again = Desk(desk.store.home, reader=desk.reader)
-    assert [one.id for one in again.store.all()] == [id_of(good)]
-    again.queue.close()
 
 
 @pytest.mark.parametrize(

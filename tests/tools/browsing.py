@@ -22,7 +22,7 @@ FLAGS = (
 )
 """Chromium shall talk to nobody but the page."""
 PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
-SIZES = {"desk": (1280, 800), "phone": (390, 844)}
+VIEWS = ((DESK, "light"), (PHONE, "light"), (DESK, "dark"))
 PATIENCE = 300_000
 """Milliseconds for a browser or a diagnosis that has a busy processor."""
 REFUSED = "400 (Bad Request)"
@@ -53,9 +53,9 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(browser: Browser, address: str, size: dict[str, int], scheme: str = "light") -> Iterator[Page]:
+def opened(browser: Browser, address: str, size: dict[str, int], **more: Any) -> Iterator[Page]:
     """A page in a browser of its own; every message, error and request elsewhere fails the test."""
-    context = browser.new_context(viewport=size, color_scheme=scheme)
+    context = browser.new_context(viewport=size, **more)
     context.set_default_timeout(PATIENCE)
     page, said = context.new_page(), []
     home = address.partition("?")[0]
@@ -85,35 +85,36 @@ def dropped(page: Page, paths: Sequence[Path]) -> None:
     page.evaluate(code, content)
 
 
-def axe_script() -> str:
-    """The script of axe-core; skips where it is not installed."""
+def violations(page: Page) -> list[tuple[str, str, list[str]]]:
+    """What axe-core finds: rule, impact, and the elements; skips where it is not installed."""
     axe = pytest.importorskip("axe_core_python", reason="axe-core-python is not installed")
-    return (Path(axe.__file__).parent / "axe.min.js").read_text("utf-8")
-
-
-def violations(page: Page, script: str) -> list[tuple[str, str, list[str]]]:
-    """What axe-core finds: rule, impact, and the elements."""
-    page.evaluate(script)
+    page.evaluate((Path(axe.__file__).parent / "axe.min.js").read_text("utf-8"))
     call = "(rules) => axe.run(document, { runOnly: rules, resultTypes: ['violations'], preload: false })"
     found = page.evaluate(call, RULES)["violations"]
     return [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found]
 
 
-VIEWS = ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark"))
+def check_page(page: Page, views: Sequence[tuple[dict[str, int], str]] = VIEWS) -> None:
+    """Nothing is found, and nothing is wider than the screen."""
+    page.wait_for_load_state("load")  # a selector may be there before the style sheet of a new page is
+    for size, scheme in views:
+        page.set_viewport_size(size)
+        page.emulate_media(color_scheme=scheme)
+        assert violations(page) == [], (size, scheme)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
 
 
-def check_by_axe(browser: Any, html: str, folder: Path, views: Sequence[tuple[tuple[int, int], Any]] = VIEWS) -> None:
-    """Nothing is found, and nothing is wider than the screen, with everything unfolded."""
-    script = axe_script()
+def unfolded(page: Page, views: Sequence[tuple[dict[str, int], str]] = VIEWS) -> None:
+    """A page is checked with everything unfolded."""
+    page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
+    check_page(page, views)
+
+
+def check_by_axe(browser: Any, html: str, folder: Path) -> None:
+    """A page that is a text is checked."""
     (folder / "page.html").write_text(html, "utf-8")
-    for (width, height), scheme in views:
-        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True)
-        page.set_default_timeout(PATIENCE)
-        page.goto((folder / "page.html").as_uri())
-        page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-        assert violations(page, script) == [], (width, scheme)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        page.close()
+    with opened(browser, (folder / "page.html").as_uri(), DESK) as page:
+        unfolded(page)
 
 
 def processor(pid: int) -> float:

@@ -1,6 +1,9 @@
 """Commands as a person gives them: in this process or in another, with a cache of their own and a small scenario."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ from small_loop import TEXT
 import cosim.models.cache
 from cosim.cli import main
 
+Refused = Callable[..., str]
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(cosim.models.cache.__file__).parents[2]), "NO_COLOR": "1"}
 
 
@@ -30,3 +34,21 @@ def call(*arguments: object) -> int:
     with pytest.raises(SystemExit) as left:
         main([str(argument) for argument in arguments])
     return int(left.value.code or 0)
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+    """A command that is refused: call it with its words; what it says."""
+
+    def said(*words: object) -> str:
+        capsys.readouterr()
+        assert call(*words) == 2
+        return capsys.readouterr().err
+
+    return said
+
+
+def python(*words: str, folder: Path | None = None, **more: str) -> "subprocess.CompletedProcess[str]":
+    """Run Python in a process of its own, where a folder is the current one and some variables are set."""
+    command = [sys.executable, *words]
+    return subprocess.run(command, env=ENVIRONMENT | more, cwd=folder, capture_output=True, text=True, check=False)

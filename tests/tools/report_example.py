@@ -1,5 +1,6 @@
 """A diagnosis made up by hand, with everything a report can hold: two effects, none, or something unknown."""
 
+import re
 from functools import cache
 from typing import Any
 
@@ -157,3 +158,14 @@ def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary
 def report_of(kind: str = "two", motion: Any = "rotary") -> str:
     """Its report, made once: pictures take a second."""
     return render(diagnosis(kind, motion))
+
+
+def text_of(html: str) -> str:
+    """The page as it is read before anything is unfolded."""
+    body = re.sub(r"<(style|script|noscript).*?</\1>", " ", html.split("<body>")[1], flags=re.S)
+    inner = re.compile(
+        r"<details(?![^>]*open)[^>]*><summary>((?:(?!</summary>).)*)</summary>(?:(?!<details).)*?</details>", re.S
+    )
+    while inner.search(body):
+        body = inner.sub(r"\1", body)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body))
