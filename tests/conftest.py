@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "tools"))
 sys.path += [str(ROOT / "bench"), str(ROOT)]  # behind the installed package, which is the one that is tested
 
+from browsing import browser  # noqa: E402
 from commands import refused, scenario  # noqa: E402
 from mirror_fmu import mirror  # noqa: E402
 from oscillators import plain  # noqa: E402
@@ -24,7 +25,7 @@ from ssp_files import read  # noqa: E402
 from start_fmus import make  # noqa: E402
 from tiny_fmu import tiny  # noqa: E402
 
-__all__ = ["make", "mirror", "plain", "read", "refused", "scenario", "tiny"]
+__all__ = ["browser", "make", "mirror", "plain", "read", "refused", "scenario", "tiny"]
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -26,15 +26,7 @@ from cosim.support.notebook import shows_progress
 from cosim.support.plugins import HANDLES, names
 
 FUNCTIONS = ("diagnose", "export", "identify", "read", "run", "show")
-CARD = """
-[mount]
-name = "axis"
-inertia = 3.0
-[friction]
-model = "coulomb"
-Fc = 2.0
-sigma2 = 1.0
-"""
+CARD = '[mount]\nname = "axis"\ninertia = 3.0\n[friction]\nmodel = "coulomb"\nFc = 2.0\nsigma2 = 1.0\n'
 SCENARIO = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.2")
 
 
@@ -80,9 +72,7 @@ def test_a_line_is_shown_and_gone_at_the_end(line: list[str]) -> None:
     assert line[-1] == ""
 
 
-def test_who_is_told_himself_sees_no_line_and_outside_a_notebook_none_is_shown(
-    line: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_is_told_himself_sees_no_line_nor_who_has_no_notebook(line: list[str], monkeypatch: Any) -> None:
     told: list[str] = []
     work(on_progress=told.append)
     monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: None)
@@ -90,9 +80,6 @@ def test_who_is_told_himself_sees_no_line_and_outside_a_notebook_none_is_shown(
     monkeypatch.delitem(sys.modules, "IPython")
     assert work() == "done"
     assert (told, line) == (["first", "at once after it"], [])
-
-
-# Every kind of source.
 
 
 def table(rows: int = 400) -> dict[str, np.ndarray]:
@@ -112,10 +99,8 @@ def test_all_names_exist_and_every_function_and_class_says_what_it_is() -> None:
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_describes_each_argument_what_it_returns_and_what_it_raises(name: str) -> None:
     function = getattr(cosim, name)
-    text = inspect.getdoc(function) or ""
-    described = {
-        word.strip() for line in text.splitlines() if ":" in line for word in line.partition(":")[0].split(",")
-    }
+    heads = [line.partition(":")[0] for line in (inspect.getdoc(function) or "").splitlines() if ":" in line]
+    described = {word.strip() for head in heads for word in head.split(",")}
     assert set(inspect.signature(function).parameters) <= described
     assert {"Returns", "Raises"} <= described
 

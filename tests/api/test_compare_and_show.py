@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from browsing import browser, check_by_axe
+from browsing import check_by_axe
 from commands import call
 from report_example import diagnosis
 
@@ -18,8 +18,6 @@ from cosim.support.errors import InputError, OutputError, RecordingError
 from cosim.support.extras import install
 from cosim.system.diagram import origin
 from cosim.system.sections import ComponentSection
-
-__all__ = ["browser"]
 
 
 def waves(t: np.ndarray) -> np.ndarray:
@@ -106,8 +104,6 @@ def test_axe_finds_nothing_in_the_page_of_a_comparison(browser: Any, tmp_path: P
     check_by_axe(browser, (tmp_path / "out" / "compare.html").read_text("utf-8"), tmp_path)
 
 
-# What the project wrote.
-
 SCENARIO = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.1")
 SWEEP = """
 scenario = "short.toml"
@@ -160,9 +156,7 @@ def test_an_fmu_is_told_by_its_place_in_the_archive_and_advice_names_packages_th
 
 
 @pytest.mark.parametrize("name", ["out", "out/table.parquet", "two.toml"])
-def test_a_sweep_is_shown_from_its_folder_its_table_and_its_file(
-    sweep: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sweep_is_shown_from_its_folder_its_table_and_its_file(sweep: Path, name: str, monkeypatch: Any) -> None:
     monkeypatch.chdir(sweep)
     shown = cosim.show(name)
     if name == "two.toml":

@@ -184,16 +184,8 @@ class Hose(LoadEffect):
     def load(self, motion):
         return self.stiffness * motion.q
 """
-CARD = """
-[mount]
-inertia = 2.0
-[friction]
-model = "coulomb"
-Fc = 1.0
-sigma2 = 3.0
-[[effects]]
-effect = "stiff_hose"
-stiffness = 2.0
+CARD = """[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0
+[[effects]]\neffect = "stiff_hose"\nstiffness = 2.0
 """
 
 

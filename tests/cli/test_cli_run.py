@@ -74,9 +74,7 @@ def test_an_fmu_that_prints_does_not_spoil_the_data(scenario: Path, tmp_path: Pa
     assert done.stderr.count("chatter") == 200
 
 
-def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
-    scenario: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_run_says_how_long_and_an_absurd_one_ends(scenario: Path, refused: Refused, monkeypatch: Any) -> None:
     told: list[str] = []
     with monkeypatch.context() as clock:
         clock.setattr(cosim.cli.run, "perf_counter", iter([45.0, 45.01, 2.0, 4.0]).__next__)

@@ -4,15 +4,16 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from commands import ENVIRONMENT, call
+from commands import ENVIRONMENT, Refused, call
 from mortal import marked, mortal
+from waiting import until
 
 import cosim
 from cosim.api.machine_work import Options, Order
@@ -31,8 +32,7 @@ def write(path: Path, level: float, seed: int) -> None:
 
 
 @pytest.fixture
-def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
+def fleet(tmp_path: Path) -> Path:
     (tmp_path / "all").mkdir()
     for machine, level in LEVELS.items():
         for run in (1, 2):
@@ -40,9 +40,7 @@ def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
-    fleet: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(fleet: Path, capsys: Any) -> None:
     arguments = ("diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "2")
     assert call(*arguments) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -60,23 +58,18 @@ def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
     assert "holds several: north, south" in capsys.readouterr().err
 
 
-def test_what_was_done_before_a_kill_is_not_done_again_also_without_a_folder_that_is_named(
-    fleet: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_was_done_before_a_kill_is_not_done_again(fleet: Path, monkeypatch: Any, capsys: Any) -> None:
+    """Also where no folder for results is named."""
     monkeypatch.setenv("COSIM_OUT", "")
     words, out = ["diagnose", "all", "--quick", "--json", "--workers", "1"], fleet / "cosim_out" / "all-1"
     command = mortal(sys.executable, "-m", "cosim", *words)
     given = ENVIRONMENT | {"COSIM_OUT": "", "COSIM_MARK": str(fleet)}
     process = subprocess.Popen(command, env=given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-    assert process.stdout is not None
     first = json.loads(process.stdout.readline())["machine"]
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stdout.close()
-    end = time.monotonic() + 30
-    while marked(f"COSIM_MARK={fleet}"):
-        assert time.monotonic() < end, "a process of a machine outlives the kill"
-        time.sleep(0.1)
+    until(lambda: not marked(f"COSIM_MARK={fleet}"), 30)  # no process of a machine outlives the kill
     kept = (out / first / "diagnosis.json").stat().st_mtime_ns
     with (out / "machines.jsonl").open("a") as journal:
         journal.write('{"machine": "sou')  # what a kill leaves half written
@@ -128,7 +121,7 @@ def test_a_cluster_gives_the_same_answers(fleet: Path, monkeypatch: pytest.Monke
         assert held[0] == held[1]
 
 
-def test_wrong_use_is_one_sentence(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_use_is_one_sentence(fleet: Path, refused: Refused) -> None:
     with pytest.raises(SweepError, match="is no address of a Dask scheduler"):
         cosim.diagnose_folder("all", "found", cluster="nowhere")
     with pytest.raises(InputError, match="no-such cannot be listed"):
@@ -136,8 +129,8 @@ def test_wrong_use_is_one_sentence(fleet: Path, capsys: pytest.CaptureFixture[st
     (fleet / "empty").mkdir()
     with pytest.raises(InputError, match="empty holds no recordings of several machines"):
         cosim.diagnose_folder("empty", "found")
-    assert call("diagnose", "all/north_1.csv", "all/north_2.csv", "--cluster", "tcp://h:1", "--out", "x") == 2
-    assert "--cluster is for a folder of several machines" in capsys.readouterr().err
+    said = refused("diagnose", "all/north_1.csv", "all/north_2.csv", "--cluster", "tcp://h:1", "--out", "x")
+    assert "--cluster is for a folder of several machines" in said
 
 
 def test_results_among_the_recordings_are_no_machine(fleet: Path) -> None:

@@ -83,6 +83,8 @@ def test_a_verb_of_another_distribution_is_run_and_its_mistakes_are_sentences(si
     assert cosim(site, "hello", "you")[1] == "hello you!\n"
     (site / "cosim.toml").write_text("[helo]\nloud = true\n", "utf-8")
     assert '"helo" is no key' in cosim(site, "hello", "you")[2]
+    code = "import cosim; cosim.greet('you'); print('greet' in dir(cosim), cosim.run.__module__)"
+    assert mine(site, "-c", code)[1] == "hello you\nTrue cosim.api.run\n", "and Python finds each under its own name"
 
 
 def test_what_cannot_be_loaded_is_one_sentence_and_hides_nothing_else(site: Path) -> None:
@@ -93,11 +95,6 @@ def test_what_cannot_be_loaded_is_one_sentence_and_hides_nothing_else(site: Path
     assert "hello" in helped
     assert "Co-simulation" in helped
     assert "cannot be loaded" in said
-
-
-def test_python_finds_what_it_brings_under_its_name_and_ours_under_ours(site: Path) -> None:
-    code = "import cosim; cosim.greet('you'); print('greet' in dir(cosim), cosim.run.__module__)"
-    assert mine(site, "-c", code)[1] == "hello you\nTrue cosim.api.run\n"
 
 
 def test_a_file_of_its_own_kind_is_read_and_one_that_crashes_its_reader_is_a_sentence(site: Path) -> None:
@@ -112,9 +109,6 @@ def test_a_file_of_its_own_kind_is_read_and_one_that_crashes_its_reader_is_a_sen
     assert "--columns t=#1" in mine(site, "-c", code, "one.csv")[2]  # .csv stays ours, which asks for names
     crashed = mine(site, "-c", code, "two.ours")[2].splitlines()[-1]
     assert "two.ours is damaged: the library that reads .ours files crashed on it" in crashed
-
-
-# What is there, without doing any of it.
 
 
 def test_versions_abilities_extras_and_caches_are_listed(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:

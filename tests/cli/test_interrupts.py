@@ -62,9 +62,7 @@ def caused(error: Exception, cause: BaseException) -> Exception:
     ],
 )
 @pytest.mark.usefixtures("handlers", "capsys")  # not pytest's own file: a verb that fails lets go of its stdout
-def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
-    error: Exception, number: int | None, code: int | None
-) -> None:
+def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(error: Any, number: int | None, code: Any) -> None:
     """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it.
 
     Python's own `rmtree` closes a file a second time; a disk that is full is what a person must know all the same.
@@ -105,9 +103,7 @@ def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("library", ["casadi", "numpy"])
-def test_termination_ends_an_export_wherever_it_comes_with_a_word_and_leaves_nothing(
-    library: str, tmp_path: Path
-) -> None:
+def test_termination_ends_an_export_wherever_it_comes_and_leaves_nothing(library: str, tmp_path: Path) -> None:
     """Here: while the verb loads what it works with; SIGTERM comes from within."""
     start = f"""
 import builtins, signal

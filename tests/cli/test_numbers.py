@@ -174,16 +174,17 @@ def test_a_sweep_with_such_a_number_is_refused(line: str, sentence: str) -> None
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
 @pytest.mark.parametrize(
-    ("verb", "option"),
-    [("run", "--call-timeout"), ("hardware check", "--seconds"), ("prove", "--seconds"), ("identify", "--cut")],
+    "words",
+    [
+        "run loop.toml --out out --call-timeout",
+        "hardware check loop.toml --seconds",
+        "prove --out out --seconds",
+        "identify loop.toml --card paper_mount --out out --cut",
+    ],
 )
-def test_a_number_of_the_command_line_that_is_none_is_refused(
-    scenario: Path, refused: Refused, verb: str, option: str, number: str
-) -> None:
-    card = ["--card", "paper_mount"] if verb == "identify" else []
-    file = [] if verb == "prove" else [scenario]
-    out = [] if verb == "hardware check" else ["--out", "out"]
-    said = refused(*verb.split(), *file, *card, *out, option, number)
+@pytest.mark.usefixtures("scenario")
+def test_a_number_of_the_command_line_that_is_none_is_refused(words: str, number: str, refused: Refused) -> None:
+    said, option = refused(*words.split(), number), words.split()[-1]
     assert f"{option} {number}: it must be a finite number." in said or said.startswith("Usage: ")
     assert "Traceback" not in said
     assert not Path("out").exists()
@@ -193,9 +194,6 @@ def test_a_long_value_is_cut_short_in_a_message() -> None:
     assert shown(3.5) == "3.5"
     assert shown("x" * 100) == f"'{'x' * 59}... (102 characters)"
     assert shown(10**5000) == "a int"
-
-
-# What cannot end well is refused before any work is done.
 
 
 @pytest.mark.parametrize(

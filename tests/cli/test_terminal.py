@@ -87,9 +87,6 @@ def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.Capt
     assert capsys.readouterr().err.splitlines() == ["identifying", "friction map"]
 
 
-# A run with other numbers, results without a folder that was given, an answer that begins with the axis.
-
-
 def test_numbers_are_changed_for_one_run_and_the_recording_says_so(scenario: Path) -> None:
     text = scenario.read_text().replace("k = 5.0", "k = 7.0").replace("frequency = 2.0", "frequency = 3.0")
     Path("other.toml").write_text(text)

@@ -126,9 +126,6 @@ def test_command_lines_are_found_and_help_has_two_or_three_of_each_verb() -> Non
     assert {len(list(typed(block.text))) for block in HELP} == {2, 3}
 
 
-# What the guides to scenarios and investigations show is what happens.
-
-
 def guided(page: str, folder: Path) -> list[Block]:
     """The blocks of a guide; those that begin with the name of a file are written."""
     found = blocks(ROOT / "docs" / page)

@@ -85,10 +85,7 @@ def test_a_law_and_an_effect_of_one_file_each_are_exported_from_a_card(copy: Pat
 
 def test_the_property_tests_meet_them_by_themselves(copy: Path) -> None:
     chosen = "HerschelBulkley or herschel_bulkley or WindLoad"
-    files = [
-        str(ROOT / "tests" / one)
-        for one in ("effects/test_effect_properties.py", "friction/test_friction_properties.py")
-    ]
+    files = [str(*(ROOT / "tests").glob(f"*/test_{one}_properties.py")) for one in ("effect", "friction")]
     out = run(copy, "-m", "pytest", "-p", "no:cacheprovider", "-k", chosen, *files)
     assert int(re.findall(r"(\d+) passed", out)[-1]) >= 10
 

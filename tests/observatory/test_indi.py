@@ -4,14 +4,16 @@ import shutil
 import socket
 import subprocess
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from time import sleep
+from typing import Any
 
 import pytest
 from mortal import mortal
 from waiting import until
 
 from cosim.support.errors import OutputError
+from cosim_observatory import indi
 from cosim_observatory.indi import CLIENTS, IndiServer
 from cosim_observatory.properties import number
 from cosim_observatory.telescope import Telescope
@@ -153,10 +155,21 @@ def test_what_is_refused_is_told_in_a_sentence(server: IndiServer, text: str, se
     assert not server.telescope.slewing
 
 
-def test_a_client_that_speaks_no_indi_or_is_one_too_many_is_hung_up_on(server: IndiServer) -> None:
-    for text in (b"GET / HTTP/1.1\r\n\r\n</x>", b'<!DOCTYPE x [<!ENTITY a "b">]>', b"</indi>"):
-        with socket.create_connection(("127.0.0.1", server.port), timeout=10) as wire:
-            wire.sendall(text)
+NO_INDI = [b"GET / HTTP/1.1\r\n\r\n</x>", b'<!DOCTYPE x [<!ENTITY a "b">]>', b"</indi>", b"<a>" * 100]
+TOO_LONG = [b"<a " + b"x" * 200_000, b"<getProperties>" + b"<!-- -->" * 20_000]
+
+
+@pytest.mark.parametrize("text", [*NO_INDI, *TOO_LONG], ids=lambda text: text[:15].decode())
+def test_a_client_that_speaks_no_indi_is_hung_up_on(server: IndiServer, text: bytes) -> None:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as wire, suppress(ConnectionError):
+        wire.sendall(text)
+        assert wire.recv(100) == b""
+
+
+def test_a_client_that_asks_for_nothing_or_is_one_too_many_is_hung_up_on(server: IndiServer, monkeypatch: Any) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(indi, "GREETING", 0.5)
+        with socket.create_connection(("127.0.0.1", server.port), timeout=20) as wire:
             assert wire.recv(100) == b""
     many = [socket.create_connection(("127.0.0.1", server.port), timeout=10) for _ in range(CLIENTS)]
     try:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from browsing import DESK, VIEWS, browser, check_by_axe, opened, unfolded
+from browsing import DESK, VIEWS, check_by_axe, opened, unfolded
 from commands import call
 from hypothesis import given, settings
 from hypothesis import strategies as some
@@ -31,8 +31,6 @@ from cosim_investigation.story import Answered, Moved, Story
 from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
-
-__all__ = ["browser"]
 
 
 @cache
@@ -55,9 +53,7 @@ def of_story(folder: Path, linear: bool = False) -> str:
     return write_page(folder / "story.html", story, folder, "cosim investigate x", linear).read_text("utf-8")
 
 
-def test_the_page_of_an_investigation_has_units_and_12_px_on_a_phone_a_diagram_9_px(
-    tmp_path: Path,
-) -> None:
+def test_the_page_of_an_investigation_has_units_and_12_px_on_a_phone_a_diagram_9_px(tmp_path: Path) -> None:
     html = of_story(tmp_path)
     assert "<th></th>" not in html
     assert "held-out error [N·m]" in html
@@ -102,9 +98,7 @@ CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
         ("two", "linear", VIEWS[1:2]),
     ],
 )  # styles and widths are those of one template: each way of looking at one report, others in one way
-def test_a_report_is_shown_without_complaint(
-    browser: Any, kind: str, motion: str, views: tuple[Any, ...], tmp_path: Path
-) -> None:
+def test_a_report_is_shown_without_complaint(browser: Any, kind: str, motion: str, views: Any, tmp_path: Path) -> None:
     """It fits the screen, texts have 12 px, the explorer has three ticks on each side, axe finds nothing."""
     (tmp_path / "report.html").write_text(report_of(kind, motion), "utf-8")
     with opened(browser, (tmp_path / "report.html").as_uri(), views[0][0]) as page:
@@ -144,19 +138,9 @@ def test_no_printed_page_holds_a_single_row(browser: Any, tmp_path: Path) -> Non
 
 # The page of a run shows what was recorded: nothing is lost by thinning, and nothing needs the network.
 
-STATISTICS = {
-    "simulated_seconds": 1.0,
-    "steps": 1000,
-    "seconds": 0.1,
-    "ratio_to_real_time": 10.0,
-    "microseconds_per_step": 1.0,
-    "warnings": 0,
-    "rows": 1000,
-    "loop": "compiled",
-    "algorithm": "jacobi",
-    "unconnected": ["plant.b"],
-    "notes": ["A note with <angles>."],
-}
+TIMES = {"simulated_seconds": 1.0, "seconds": 0.1, "ratio_to_real_time": 10.0, "microseconds_per_step": 1.0}
+COUNTS = {"steps": 1000, "rows": 1000, "warnings": 0}
+NOTED = {"loop": "compiled", "algorithm": "jacobi", "unconnected": ["plant.b"], "notes": ["A note with <angles>."]}
 
 
 def digest_of(table: dict[str, np.ndarray], units: dict[str, str] | None = None, chunk: int = 1 << 16) -> Digest:
@@ -238,7 +222,7 @@ def page_of(folder: Path, *recorded: Any) -> str:
     """The page of a run of which a table, units and an origin were recorded."""
     Recording("run", *recorded).write(folder / "run.parquet")
     scenario = parse_scenario(TEXT, "loop.toml", Path())
-    return write_run(folder / "run.html", folder / "run.parquet", scenario, STATISTICS).read_text("utf-8")
+    return write_run(folder / "run.html", folder / "run.parquet", scenario, TIMES | COUNTS | NOTED).read_text("utf-8")
 
 
 @pytest.fixture
@@ -270,7 +254,6 @@ def test_a_page_has_every_picture_says_what_ran_leads_with_the_error_and_needs_n
     assert "kind = &quot;sine&quot;" in page
     assert "controller.y" in page or "controller" in page
     facts = re.search(r'<div class="facts">(.*?)</div><p class="quiet">(.*?)</p>', page)
-    assert facts is not None
     names = re.findall(r"</b>([^<]*)<", facts[1])
     assert names == ["RMS tracking error", "largest error", "largest torque", "simulated"]
     assert re.match(r"<span><b>[\d.]+\xa0arcsec</b>", facts[1])

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from learned_told import TOLD
 from lxml import etree
-from report_example import FOUND, REST, RIVALS, diagnosis, report_of, text_of
-from report_example import report_of as page
+from report_example import FOUND, KINDS, REST, RIVALS, diagnosis, report_of, text_of
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Where
 from cosim.diagnosis.effects import TRIED
@@ -29,19 +28,17 @@ from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture
 from cosim.report.terminal import summary
 
-TWO, SCALES = diagnosis("two"), Scales.of(diagnosis("two"))
+TWO = diagnosis("two")
 
-CASES = [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
-KINDS = pytest.mark.parametrize(("kind", "motion"), CASES)
 HEADINGS = """Findings|Next experiment|Everything that was looked for|What stays unexplained|When|Where|
 Validation|The worst seconds|Look at the recordings|Parameters of the base|How this was made"""
 SIGNALS = ("t", "q", "v", "tau", "before", "after", "missing", "band")
 BARE: dict[str, Any] = {name: {} for name in ("provenance", "improved", "base_parameters", "next_experiment")}
 
 
-@KINDS
+@pytest.mark.parametrize(("kind", "motion"), KINDS)
 def test_a_page_is_one_small_well_formed_file_that_asks_for_nothing(kind: str, motion: str) -> None:
-    html = page(kind, motion)
+    html = report_of(kind, motion)
     assert len(html.encode()) <= 1_000_000
     assert not re.search(r"https?://|//cdn|@import|url\((?!#)", html)
     assert not re.search(r"<(link|img|iframe|object|base)\b|\ssrc=", html)
@@ -86,9 +83,9 @@ ANSWERS = {
 ONCE = ("Turning forward takes 0.26 N·m more than backward.", "Check clamp brake and lip seal", "0.21 to 0.31")
 
 
-@KINDS
+@pytest.mark.parametrize(("kind", "motion"), KINDS)
 def test_a_page_tells_its_answer_once_and_in_900_words(kind: str, motion: str) -> None:
-    html = page(kind, motion)
+    html = report_of(kind, motion)
     read = re.sub(r"<[^>]+>", " ", re.sub(r"<(style|script).*?</\1>", "", html, flags=re.S))
     first = read.split(" Findings ")[0] if kind == "two" and motion == "rotary" else read
     assert [text for text in ANSWERS[kind, motion] if text not in first] == []
@@ -104,11 +101,11 @@ def test_a_page_tells_its_answer_once_and_in_900_words(kind: str, motion: str) -
 
 def test_every_section_and_answer_is_there() -> None:
     for heading in HEADINGS.replace("\n", "").split("|"):
-        assert re.search(rf"<h2[^>]*>{heading}</h2>", page())
+        assert re.search(rf"<h2[^>]*>{heading}</h2>", report_of())
     for finding in diagnosis().findings:
-        assert finding.title in page()
-    assert "4be1" * 16 in page()
-    assert "77a0" * 16 in page()
+        assert finding.title in report_of()
+    assert "4be1" * 16 in report_of()
+    assert "77a0" * 16 in report_of()
 
 
 def test_hostile_names_stay_text_and_letters_of_any_script_raise_no_warning() -> None:
@@ -124,7 +121,7 @@ def test_hostile_names_stay_text_and_letters_of_any_script_raise_no_warning() ->
 
 def test_a_report_is_reproducible_and_a_bare_and_short_diagnosis_makes_one_too(tmp_path: Path) -> None:
     path = write_report(diagnosis(), tmp_path / "report.html")
-    assert path.read_text("utf-8") == page()
+    assert path.read_text("utf-8") == report_of()
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
     cut = tuple(replace(tr, **{name: getattr(tr, name)[:4000] for name in SIGNALS}) for tr in TWO.traces[2:])
     html = render(replace(TWO, traces=cut, regions=(), regions_after=(), **BARE))
@@ -160,9 +157,8 @@ def test_an_experiment_that_noise_would_hide_is_said_to_need_more_motion(differe
 
 def test_the_header_counts_what_was_recorded_and_not_what_was_judged() -> None:
     cut = tuple(replace(one, **{n: getattr(one, n)[3000:-500] for n in SIGNALS}) for one in TWO.traces)
-    assert ", 180 s at 1 kHz" in [
-        part["rest"].replace("\N{NO-BREAK SPACE}", " ") for part in identity(replace(TWO, traces=cut))
-    ]
+    rests = [part["rest"].replace("\N{NO-BREAK SPACE}", " ") for part in identity(replace(TWO, traces=cut))]
+    assert ", 180 s at 1 kHz" in rests
 
 
 def test_doubts_about_the_recordings_stand_before_the_answer() -> None:
@@ -179,7 +175,6 @@ def test_doubts_about_the_recordings_stand_before_the_answer() -> None:
 def drawn(finding: Finding, of: Diagnosis) -> Picture:
     with mpl.rc_context(STYLE):
         picture = draw(finding, samples(of.traces), Scales.of(of))
-    assert picture is not None
     return picture
 
 
@@ -236,7 +231,6 @@ def test_where_nothing_was_added_one_model_is_drawn_and_named_once() -> None:
 def test_each_table_has_a_figure_with_the_data_beside() -> None:
     whole = replace(diagnosis("unknown"), learned=TOLD)
     found = nameless(whole, Scales.of(whole))
-    assert found is not None
     assert [one.heading for one in found.pictures] == [
         "Torque over position", "Friction over position and temperature", "Drive over command", "Hysteresis",
     ]  # fmt: skip
@@ -254,34 +248,29 @@ LAW = {"friction.Fc": (2.0, 2.0, 2.0), "friction.sigma2": (0.0, 0.0, 0.0)}
 
 
 def with_law(finding: Finding) -> Diagnosis:
-    return replace(
-        TWO, findings=(finding,), delivered=(finding.effect,), friction_law={"base": "coulomb"}, base_parameters=LAW
-    )
+    known: Any = {"friction_law": {"base": "coulomb"}, "base_parameters": LAW}
+    return replace(TWO, findings=(finding,), delivered=(finding.effect,), **known)
 
 
 def test_the_torque_of_a_ripple_is_its_waves_and_friction_over_position_resists_by_its_share() -> None:
     torque = own_torque(FOUND[0], diagnosis("two"))
-    assert torque is not None
     expected = 0.42 * np.cos(24 * Q + 0.4) + 0.125 * np.cos(48 * Q - 0.3)
     assert torque(Q, V) == pytest.approx(expected, abs=1e-9)
     resists = own_torque(RIPPLE, with_law(RIPPLE))
-    assert resists is not None
     assert (resists(Q, V) * np.sign(V)).max() == pytest.approx(0.25 * 2.0, rel=0.05)
     assert resists(Q, -V) == pytest.approx(-resists(Q, V))
 
 
-def test_an_effect_of_the_model_is_drawn_by_itself_and_one_that_is_not_there_is_not() -> None:
-    for finding, of, is_drawn in (
-        (FOUND[0], TWO, True),
-        (FOUND[0], replace(TWO, delivered=()), False),
-        (RIPPLE, with_law(RIPPLE), True),
-    ):
-        with mpl.rc_context(STYLE):
-            picture = own(finding, of, samples(of.traces), Scales.of(of))
-        assert ("other effects taken out" in getattr(picture, "caption", "")) == is_drawn
+@pytest.mark.parametrize(
+    ("finding", "of", "is_drawn"),
+    [(FOUND[0], TWO, True), (FOUND[0], replace(TWO, delivered=()), False), (RIPPLE, with_law(RIPPLE), True)],
+    ids=["in the model", "not there", "of friction"],
+)
+def test_an_effect_of_the_model_is_drawn_by_itself(finding: Finding, of: Diagnosis, is_drawn: bool) -> None:
+    with mpl.rc_context(STYLE):
+        picture = own(finding, of, samples(of.traces), Scales.of(of))
+    assert ("other effects taken out" in getattr(picture, "caption", "")) == is_drawn
 
-
-# Friction over speed: smooth curves of both cards, markers without the other effects.
 
 BOTH_WAYS = Where(axis="direction", description="both directions", regions=())
 ASYMMETRY = replace(FOUND[1], parameters={"level_asymmetry": 0.2, "viscous_asymmetry": 0.0}, where=BOTH_WAYS)
@@ -297,13 +286,11 @@ def told() -> Diagnosis:
 
 def test_smooth_curves_of_both_cards_are_drawn_in_the_report(told: Diagnosis) -> None:
     both = curves(told)
-    assert both is not None
     v = np.array([0.1, 0.5, 1.0])
     np.testing.assert_allclose(both.before(v), 1.1 + 0.2 * v)
     np.testing.assert_allclose(both.after(v), 1.2 * 1.2 + 0.3 * v)
     np.testing.assert_allclose(both.after(-v), -(0.8 * 1.2 + 0.3 * v))
     picture = friction(ASYMMETRY, told, samples(told.traces), Scales.of(told))
-    assert picture is not None
     assert "other effects taken out" in picture.caption
     assert "dotted: backward" in picture.caption
     shown = context(told)["blocks"]

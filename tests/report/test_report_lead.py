@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from learned_told import TOLD
-from report_example import FOUND, REST, RIVALS, diagnosis, report_of, text_of
+from report_example import FOUND, KINDS, REST, RIVALS, diagnosis, report_of, text_of
 
 from cosim.delivery.deliver import chosen_of_sets
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Sanity, Where
@@ -63,9 +63,8 @@ TOGETHER = {p: tuple(replace(one, probability=p) for one in RIVALS) for p in (0.
     ],
     ids=lambda one: one if isinstance(one, str) else "",
 )
-def test_the_heading_counts_what_was_found_and_what_may_be_and_is_as_sure_as_rivals_are_together(
-    whole: Diagnosis, heading: str
-) -> None:
+def test_the_heading_counts_what_was_found_and_what_may_be(whole: Diagnosis, heading: str) -> None:
+    """It is as sure as rivals are together."""
     assert lead.heading(whole) == heading
 
 
@@ -139,10 +138,7 @@ def test_the_first_of_several_possible_causes_is_said_to_be_in_the_model() -> No
     whole = held(*RIVALS)
     html = " ".join(render(whole).split())
     assert "The improved model holds the likelier, gravity unbalance." in html
-    assert (
-        "possible causes: gravity unbalance or encoder eccentricity, of which the first is in the improved model"
-        in html
-    )
+    assert "gravity unbalance or encoder eccentricity, of which the first is in the improved model" in html
     assert "No improved model was written" not in html
     assert "Neither" not in html
     assert "with the likeliest cause" in html
@@ -157,12 +153,7 @@ def test_the_first_of_several_possible_causes_is_said_to_be_in_the_model() -> No
     assert "The improved model holds torque offset: it is a special case of the other." in shown.sentences
 
 
-# The summary on a terminal.
-
-
-@pytest.mark.parametrize(
-    ("kind", "motion"), [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
-)
+@pytest.mark.parametrize(("kind", "motion"), KINDS)
 def test_a_heading_has_one_sentence_a_lead_two_and_the_terminal_80_columns(kind: str, motion: str) -> None:
     whole = diagnosis(kind, motion)
     assert len(re.findall(r"[.!?](?= [A-Z]|$)", said(whole))) <= 2
@@ -216,7 +207,6 @@ def learned() -> Diagnosis:
 
 def section(html: str) -> str:
     found = re.search(r'<section class="nameless".*?</section>', html, re.DOTALL)
-    assert found
     return found[0]
 
 

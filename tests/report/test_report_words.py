@@ -64,16 +64,11 @@ def test_numbers_of_the_base_have_units(motion: str, units: list[str]) -> None:
 
 @pytest.mark.parametrize(
     ("share", "why"),
-    [
-        ("97.0", "but fits worse where noise is low"),
-        ("90.7", "the detail of what is left decides"),
-        ("80.0", "this 90.9 %"),
-    ],
+    [("97.0", "but fits worse where noise is low"), ("90.7", "the detail of what is left decides"), ("80.0", "90.9 %")],
 )
 def test_a_rival_that_removes_more_is_said_to_fit_worse(share: str, why: str) -> None:
-    close = replace(
-        FOUND[0], ruled_out=(), less_likely=(f"Torque offset: removes {share} % of the error energy, this 90.9 %",)
-    )
+    told = f"Torque offset: removes {share} % of the error energy, this 90.9 %"
+    close = replace(FOUND[0], ruled_out=(), less_likely=(told,))
     whole = replace(diagnosis("two"), findings=(close, *REST))
     said = dict(block(blocks(whole)[0], whole, Scales.of(whole), None).rows)["Less likely"]
     assert why in said
@@ -81,12 +76,11 @@ def test_a_rival_that_removes_more_is_said_to_fit_worse(share: str, why: str) ->
 
 
 def test_a_rival_that_fits_as_well_is_less_likely_and_how_far_one_is_behind_stands_among_the_numbers() -> None:
-    close = replace(
-        FOUND[0], ruled_out=(), less_likely=("Torque offset: removes 90.3% of the error energy, this 90.9%",)
-    )
+    told = "Torque offset: removes 90.3% of the error energy, this 90.9%"
+    close = replace(FOUND[0], ruled_out=(), less_likely=(told,))
     html = render(replace(TWO, findings=(close, *FOUND[1:], *RIVALS, *REST)))
     assert "<dt>Less likely</dt><dd>Torque offset: removes 90.3%" in html
-    assert as_json(replace(TWO, findings=(close,)))["effects"][0]["less_likely"] == list(close.less_likely)
+    assert as_json(replace(TWO, findings=(close,)))["effects"][0]["less_likely"] == [told]
     behind = replace(FOUND[0], ruled_out=("Torque offset: removes 70.7%, this 83.0% (126 nats behind)",))
     html = render(replace(TWO, findings=(behind, *FOUND[1:], *RIVALS, *REST)))
     assert "<dd>Torque offset: removes 70.7%, this 83.0%</dd>" in html
@@ -143,12 +137,10 @@ def test_angles_and_lengths_are_in_units_that_need_no_zeros_and_a_direction_has_
     ring = replace(RIVALS[1], size="7e-06 rad", size_range="6e-06 to 8e-06", visible_from=2.4e-6, units={})
     assert words.sized(ring) == ("1.44″", "1.24 to 1.65")
     assert words.shows_from(ring) == "0.50″"
-    assert words.stated(replace(ring, statement="The encoder errs by 7e-06 rad either way")).startswith(
-        "The encoder errs by 1.4″ either way."
-    )
-    assert (
-        words.in_handy_units("0.42 N·m at 0.05 rad/s and 0.3 m/s") == "0.42 N·m at 2.9°/s and 0.30\N{NO-BREAK SPACE}m/s"
-    )
+    erring = replace(ring, statement="The encoder errs by 7e-06 rad either way")
+    assert words.stated(erring).startswith("The encoder errs by 1.4″ either way.")
+    handy = words.in_handy_units("0.42 N·m at 0.05 rad/s and 0.3 m/s")
+    assert handy == "0.42 N·m at 2.9°/s and 0.30\N{NO-BREAK SPACE}m/s"
     held = replace(TWO.heldout, position={"before": 4e-6, "after": 2e-6})
     rows = {row[0]: row for row in proof(replace(TWO, heldout=held), SCALES).rows}
     assert rows["Position, closed loop [″]"][2:4] == ("0.825", "0.413")
@@ -165,14 +157,9 @@ def test_angles_and_lengths_are_in_units_that_need_no_zeros_and_a_direction_has_
 
 def test_a_limit_is_of_the_number_that_is_told_as_the_size() -> None:
     """The viscous part leads here: three of its standard errors, not of the level's."""
-    effect = FrictionAsymmetry(level_asymmetry=0.07, viscous_asymmetry=-0.18)
-    numbers = Numbers(
-        {"level_asymmetry": 0.07, "viscous_asymmetry": -0.18}, {"level_asymmetry": 0.064, "viscous_asymmetry": 0.006}
-    )
-    assert visible_from(effect, numbers) == pytest.approx(3 * 200 * 0.006)
-
-
-# What to do: orders that help, for the machine at hand and the model that there is.
+    values = {"level_asymmetry": 0.07, "viscous_asymmetry": -0.18}
+    numbers = Numbers(values, {"level_asymmetry": 0.064, "viscous_asymmetry": 0.006})
+    assert visible_from(FrictionAsymmetry(**values), numbers) == pytest.approx(3 * 200 * 0.006)
 
 
 PARTS = re.compile("brake|seal|counterweight|disc|pier|tube")
@@ -216,13 +203,10 @@ def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_
 
 # Every effect that a diagnosis looks for has three checks with their results, and a repair by kind of machine.
 
-ASYMMETRY = FOUND[1]
-
 
 @pytest.mark.parametrize("effect", sorted(TRIED))
 def test_an_effect_has_three_checks_with_two_results_and_a_repair_by_machine(effect: str) -> None:
     known = repairs_of(effect)
-    assert known is not None
     assert len(known.checks) == 3
     for check in known.checks:
         assert check.do.endswith(".")
@@ -248,11 +232,10 @@ def test_files_and_kinds_of_machines_are_those_that_there_are_and_no_path_is_an_
 def test_the_report_has_checks_and_the_repairs_that_fit_the_motion() -> None:
     html = report_of("two")
     known = repairs_of("friction_asymmetry")
-    assert known
     assert all(check.do.split(",")[0] in html for check in known.checks)
     for kind, text in known.by_machine.items():
         assert (text.split(",")[0].replace("'", "&#39;") in html) == (kind in MOTIONS["rotary"]), kind
-    unsure = replace(ASYMMETRY, answer="not_proven")
+    unsure = replace(FOUND[1], answer="not_proven")
     assert "Three checks" not in render(replace(diagnosis("two"), findings=(unsure, *REST), verdict=()))
 
 

@@ -13,14 +13,13 @@ import httpx2
 import pytest
 from commands import python
 from mortal import mortal
-from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording
-from serving import state as state_of
+from serving import CARD, HERE, TOKEN, act, alive, client_of, new, put, ready, recording, state_of
 from starlette.testclient import TestClient
 from waiting import until
 
 from cosim.support.errors import InputError, OutputError
 from cosim.support.lock import claimed
-from cosim_serve import example
+from cosim_serve import example, uploads
 from cosim_serve.desk import Desk
 from cosim_serve.door import NAME, door
 from cosim_serve.job import Upload
@@ -39,9 +38,7 @@ def test_without_the_token_nothing_is_answered(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize(("site", "status"), [("none", 303), ("cross-site", 200)], ids=["typed", "from a file"])
-def test_the_token_becomes_a_cookie_that_scripts_cannot_read_and_leaves_the_address(
-    desk: Desk, site: str, status: int
-) -> None:
+def test_the_token_leaves_the_address_for_a_cookie_that_no_script_reads(desk: Desk, site: str, status: int) -> None:
     """Who comes from a file is led on by a page, as the cookie is not given to a redirect."""
     stranger = client_of(desk, token="wrong")
     answer = stranger.get(f"/?token={TOKEN}", headers={"sec-fetch-site": site}, follow_redirects=False)
@@ -84,18 +81,12 @@ def test_every_answer_carries_the_policy_and_no_page_needs_an_exception_from_it(
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", "".join(page.text for page in pages))
 
 
-# The process
-
-
 def begun(home: Path, **environment: str) -> tuple["subprocess.Popen[str]", str]:
     """A server with its folder, its address; a browser is opened where one is named."""
     quiet = () if environment else ("--no-browser",)
     command = mortal(sys.executable, "-m", "cosim", "serve", *quiet, "--data", str(home))
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(
-        command, stdout=pipe, stderr=pipe, text=True, cwd=HERE.parent, env=os.environ | environment
-    )
-    assert process.stdout is not None
+    pipe, env = subprocess.PIPE, os.environ | environment
+    process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, cwd=HERE.parent, env=env)
     return process, process.stdout.readline().strip()
 
 
@@ -118,9 +109,8 @@ def mode(path: Path) -> int:
         ("SIGINT", 130, 0o700, ""),
     ],
 )
-def test_the_server_prints_its_address_and_takes_its_processes_with_it_and_leaves_its_folder_as_it_was(
-    tmp_path: Path, sign: str, code: int, before: int, who: str
-) -> None:
+def test_a_server_takes_its_processes_with_it(tmp_path: Path, sign: str, code: int, before: int, who: str) -> None:
+    """It prints its address before, and leaves its folder as it was."""
     home = tmp_path / "project"
     home.mkdir()
     home.chmod(before)
@@ -167,13 +157,8 @@ def test_without_its_extra_one_sentence_says_how_to_get_it() -> None:
     assert "Traceback" not in done.stderr
 
 
-# The way in: no token in an argument of a browser, and no folder that is closed unasked
-
-
 @POSIX
-def test_the_browser_is_opened_with_a_file_that_its_owner_alone_can_read_and_that_leads_to_the_address(
-    tmp_path: Path,
-) -> None:
+def test_the_browser_is_opened_with_a_file_of_its_owner_alone_that_leads_to_the_address(tmp_path: Path) -> None:
     told, home = tmp_path / "told", tmp_path / "data"
     browser = tmp_path / "browser"
     browser.write_text(f'#!/bin/sh\necho "$@" > {told}.new && mv {told}.new {told}\n', "utf-8")
@@ -200,7 +185,6 @@ def test_the_file_leads_to_the_address_by_hand_too_and_what_lies_at_its_place_is
     other.write_text("kept", "utf-8")
     (tmp_path / NAME).symlink_to(other)
     with door(tmp_path, "http://127.0.0.1:1/?token=a&b") as path:
-        assert path is not None
         assert not path.is_symlink()
         assert re.search(r'href="http://127\.0\.0\.1:1/\?token=a&amp;b"', path.read_text("utf-8"))
     assert other.read_text("utf-8") == "kept"
@@ -220,29 +204,18 @@ def test_what_the_page_makes_is_closed_to_others(tmp_path: Path, desk: Desk) -> 
     made.queue.close()
 
 
-# The diagnosis itself
-
-
 def test_a_diagnosis_names_files_as_the_user_knows_them(tmp_path: Path) -> None:
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "short.csv").write_text("t,tau,q\n0,1,2\n1,2,3\n", "utf-8")
     (tmp_path / "card.toml").write_text(CARD, "utf-8")
-    order = Order(
-        (Upload(name="short.csv", size=1),),
-        tmp_path / "recordings",
-        tmp_path / "card.toml",
-        "axis.toml",
-        tmp_path / "out",
-    )
+    uploads, places = (Upload(name="short.csv", size=1),), (tmp_path / "recordings", tmp_path / "card.toml")
+    order = Order(uploads, *places, "axis.toml", tmp_path / "out")
     with pytest.raises(InputError) as refused:
         diagnose_order(order)
     assert str(refused.value).startswith("short.csv")
     (tmp_path / "card.toml").write_text("[mount]\n", "utf-8")
     with pytest.raises(InputError, match=r"^axis\.toml: \[mount\] inertia is missing"):
         diagnose_order(order)
-
-
-# First steps on the page: an example to try, a card from the recordings.
 
 
 def test_the_example_is_a_draft_that_lacks_nothing(client: TestClient, desk: Desk) -> None:
@@ -274,8 +247,6 @@ def test_a_card_is_estimated_from_the_recordings(client: TestClient, desk: Desk)
 
 
 def test_no_room_on_the_disk_is_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim_serve import uploads
-
     def full(*_: object) -> None:
         raise OutputError("3 MB are needed and the disk has 1 MB: remove older diagnoses.")
 

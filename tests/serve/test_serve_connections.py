@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 import serve_work
-from serving import act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording
-from serving import state as state_of
+from serving import act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, state_of
 from waiting import until
 
 from cosim.support.errors import InputError
@@ -76,17 +75,14 @@ def head_of(port: int, method: str, path: str) -> str:
 
 
 def test_many_connections_that_say_nothing_do_not_silence_the_page(
-    there: tuple[Desk, int, str],
-    capfd: pytest.CaptureFixture[str],
-    caplog: pytest.LogCaptureFixture,
-    monkeypatch: pytest.MonkeyPatch,
+    there: tuple[Desk, int, str], capfd: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     port = there[1]
     monkeypatch.setattr(connection, "MOST", 16)
     texts = ("", "GET / HTTP/1.1\nHost: ", "GET / HT")
     lines = [line(port, text) for _ in range(connection.MOST) for text in texts]
     for _ in range(3):
-        assert asked(port, "GET", "/", seconds=30)[0] == 200
+        assert asked(port, "GET", "/", seconds=30) == 200
     monkeypatch.setattr(connection, "HEAD", 0.5)
     until(lambda: all(map(is_ended, lines)))
     assert capfd.readouterr() == ("", "")
@@ -98,9 +94,7 @@ def test_many_connections_that_say_nothing_do_not_silence_the_page(
     [("", b"X: y\r\n"), ("Transfer-Encoding: chunked\n\n", b"1\r\nx\r\n"), ("Content-Length: 1000000\n\n", b"x")],
     ids=["a head", "chunks", "a body of stated size"],
 )
-def test_what_does_not_get_on_is_ended_and_leaves_nothing(
-    there: tuple[Desk, int, str], said: str, part: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_does_not_get_on_is_ended_and_leaves_nothing(there: Any, said: str, part: bytes, monkeypatch: Any) -> None:
     desk, port, job = there
     for name, seconds in {"HEAD": 0.5, "STALLED": 0.5, "LOOK": 0.1}.items():
         monkeypatch.setattr(connection, name, seconds)
@@ -158,18 +152,13 @@ def test_a_body_that_gets_on_slowly_arrives(there: tuple[Desk, int, str], monkey
         "X" * 100_000,
     ],
 )
-def test_what_is_no_request_is_refused_and_says_nothing_in_the_terminal(
-    there: tuple[Desk, int, str], text: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_request_is_refused_and_says_nothing_in_the_terminal(there: Any, text: str, capfd: Any) -> None:
     port = there[1]
     for _ in range(5):
         with suppress(ConnectionError):  # the rest of it was not read
             assert line(port, text).recv(100).startswith(b"HTTP/1.1 4")
-    assert asked(port, "GET", "/")[0] == 200
+    assert asked(port, "GET", "/") == 200
     assert capfd.readouterr() == ("", "")
-
-
-# Several at once
 
 
 class Upload:
@@ -219,9 +208,7 @@ def whole(desk: Desk, job: str) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("stated", [True, False])
-def test_of_two_uploads_of_one_name_the_first_arrives_whole_and_the_second_is_refused(
-    slow: tuple[Desk, int, str], stated: bool
-) -> None:
+def test_of_two_uploads_of_one_name_the_first_arrives_whole(slow: tuple[Desk, int, str], stated: bool) -> None:
     desk, port, job = slow
     first, second = recording(300, 1), recording(500, 2)
     one = Upload(port, job, "a.csv", first, stated)
@@ -238,7 +225,7 @@ def test_as_many_files_are_taken_as_there_may_be_however_many_come_at_once(slow:
     answers: list[int] = []
 
     def put(number: int) -> None:
-        answers.append(asked(port, "PUT", f"{job}/files?name=n{number}.csv", recording(30))[0])
+        answers.append(asked(port, "PUT", f"{job}/files?name=n{number}.csv", recording(30)))
 
     together(put, 10)
     assert sorted(answers) == [201] * 3 + [400] * 7
@@ -258,9 +245,7 @@ def test_bytes_on_their_way_count_before_they_have_come(slow: tuple[Desk, int, s
     assert Upload(port, job, "c.csv", recording(30)).finish()[0] == 201, "what was refused leaves its place"
 
 
-def test_an_upload_that_ends_after_the_start_or_the_end_of_a_job_does_not_change_it(
-    slow: tuple[Desk, int, str],
-) -> None:
+def test_an_upload_that_ends_after_the_start_or_the_end_of_a_job_is_refused(slow: tuple[Desk, int, str]) -> None:
     desk, port, removed = slow
     client = client_of(desk)
     job = ready(client)
@@ -279,9 +264,7 @@ def test_an_upload_that_ends_after_the_start_or_the_end_of_a_job_does_not_change
 
 
 @pytest.mark.parametrize("work", ["look", "card"])
-def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(
-    slow: tuple[Desk, int, str], work: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_looked_at_while_the_diagnosis_starts_is_not_kept(slow: Any, work: str, monkeypatch: Any) -> None:
     """Looking takes seconds; whoever presses the button meanwhile has started what was there."""
     desk = slow[0]
     client = client_of(desk)

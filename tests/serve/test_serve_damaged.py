@@ -59,9 +59,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize("text", [*ABSURD, *TEXTS])
-def test_a_job_that_cannot_be_read_costs_itself_alone_and_can_be_removed(
-    client: TestClient, desk: Desk, text: str
-) -> None:
+def test_a_job_that_cannot_be_read_costs_itself_alone_and_is_removed(client: TestClient, desk: Desk, text: str) -> None:
     other, job = new(client), new(client)
     note(desk, job).write_bytes(TEXTS[text] if text in TEXTS else altered(desk, job, **ABSURD[text]))
     home = client.get("/")
@@ -98,9 +96,7 @@ def test_a_damaged_view_is_told_and_is_made_anew(client: TestClient, desk: Desk,
     done(client, desk, job)
 
 
-def test_what_is_no_plain_file_in_a_result_or_a_view_is_neither_listed_nor_served(
-    client: TestClient, desk: Desk, tmp_path: Path
-) -> None:
+def test_what_is_no_plain_file_is_neither_listed_nor_served(client: TestClient, desk: Desk, tmp_path: Path) -> None:
     job = ready(client)
     folder, secret = desk.store.result(done(client, desk, job)), tmp_path / "secret"
     secret.write_text('{"problem": "SECRET"}', "utf-8")
@@ -123,9 +119,7 @@ def test_what_is_no_plain_file_in_a_result_or_a_view_is_neither_listed_nor_serve
 
 @pytest.mark.parametrize("what", ["recordings/run1.csv", "card.toml", "job.json", "recordings", "views", "result", ""])
 @pytest.mark.parametrize("kind", ["link", "pipe"])
-def test_what_leads_out_of_a_job_is_not_followed(
-    client: TestClient, desk: Desk, tmp_path: Path, what: str, kind: str
-) -> None:
+def test_what_leads_out_of_a_job_is_not_followed(client: Any, desk: Desk, tmp_path: Path, what: str, kind: str) -> None:
     job = ready(client)
     path, kept = desk.store.home / id_of(job) / what, tmp_path / "kept"
     if path.exists():

@@ -3,13 +3,13 @@
 import gzip
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import serve_work
 from damages import damaged
-from serving import CARD, HERE, act, client_of, desk_at, id_of, kept, new, put, ready, recording
-from serving import state as state_of
+from serving import CARD, HERE, act, client_of, desk_at, id_of, kept, new, put, ready, recording, state_of
 from starlette.testclient import TestClient
 
 from cosim.support.errors import InputError
@@ -48,9 +48,7 @@ def test_what_is_no_name_is_refused(given: str) -> None:
         safe_name(given, 60)
 
 
-def test_a_name_may_have_any_signs_and_a_path_in_it_leads_nowhere_else(
-    client: TestClient, desk: Desk, tmp_path: Path
-) -> None:
+def test_a_name_may_have_any_signs_and_no_path_in_it_leads_out(client: TestClient, desk: Desk, tmp_path: Path) -> None:
     job, signs = new(client), "Lauf #1 & 50% + Übung.csv"
     for name in ("../../../run.csv", "..%2f..%2frun2.csv", "..\\run3.csv", signs):
         put(client, job, name, recording())
@@ -95,9 +93,7 @@ def test_too_much_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
 def test_damaged_files_are_each_a_sentence_or_a_picture(client: TestClient, desk: Desk) -> None:
     """Real exports with bytes changed, cut, doubled or from elsewhere; the reader's process survives nearly all."""
     rng = np.random.default_rng(17)
-    samples = [
-        one for one in sorted((HERE / "samples").iterdir()) if one.suffix not in (".py", ".pyc") and one.is_file()
-    ]
+    samples = [one for one in sorted((HERE / "samples").glob("*.*")) if one.suffix not in (".py", ".pyc")]
     job, reader = new(client), set()
     for number in range(DAMAGES):
         source = samples[number % len(samples)]
@@ -124,9 +120,6 @@ def test_names_in_files_stay_text(client: TestClient) -> None:
         assert "<script>alert" not in page
         assert "<b>run" not in page
     assert "&lt;script&gt;alert(1)" in client.get(job).text
-
-
-# Seeing and correcting
 
 
 def test_a_recording_is_shown_with_what_its_columns_serve_as(client: TestClient) -> None:
@@ -210,9 +203,7 @@ def test_a_form_writes_a_card_in_si(client: TestClient, desk: Desk) -> None:
         ({"inertia": "1", "Fc": "1", "motion": "round"}, "motion"),
     ],
 )
-def test_a_form_that_is_wrong_says_why_and_keeps_what_was_typed(
-    client: TestClient, form: dict[str, str], said: str
-) -> None:
+def test_a_form_that_is_wrong_says_why_and_keeps_what_was_typed(client: TestClient, form: Any, said: str) -> None:
     answer = act(client, new(client), "write", **form)
     assert answer.status_code == 400
     assert said in answer.text
@@ -240,9 +231,6 @@ def test_what_is_missing_is_said_in_one_sentence_each(client: TestClient) -> Non
     assert "empty.csv cannot be used" not in act(client, job, "start").text
     assert act(client, job, "role", file="empty.csv", role="king").status_code == 400
     assert act(client, job, "role", file="gone.csv", role="out").status_code == 400
-
-
-# A file of several recordings: each is listed, read and used by itself, and the file is there once.
 
 
 def day() -> bytes:
@@ -298,6 +286,5 @@ def test_more_than_there_is_room_for_is_a_sentence(tmp_path: Path) -> None:
         job = new(client)
         assert put(client, job, "day.csv", day()).status_code == 201
         assert [one.name for one in state_of(small, job).uploads] == ["day.csv"]
-        assert (
-            "day.csv holds 3 recordings; here is room for 2. cosim diagnose takes any of them." in client.get(job).text
-        )
+        said = "day.csv holds 3 recordings; here is room for 2. cosim diagnose takes any of them."
+        assert said in client.get(job).text

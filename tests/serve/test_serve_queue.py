@@ -13,8 +13,7 @@ import pytest
 import serve_work
 from report_example import diagnosis
 from serve_work import NOTE
-from serving import CARD, act, alive, client_of, desk_at, done, id_of, kept, new, put, ready, recording
-from serving import state as state_of
+from serving import CARD, act, alive, client_of, desk_at, done, id_of, kept, new, put, ready, recording, state_of
 from starlette.testclient import TestClient
 from waiting import until
 
@@ -113,21 +112,17 @@ def test_history_survives_a_restart_what_ran_is_interrupted_and_what_waited_goes
         act(client, waited, "start")
         until(lambda: desk.queue.progress.answer)
     assert state_of(desk, ran).state == "interrupted"
+    killed = (store := Store(home)).new().id  # of a server that was killed, as is a folder without a note
+    store.put(killed, state="running")
+    (home / "20260101-000000-abcdef").mkdir()
     with desk_at(home, serve_work.quickly) as desk:
         until(lambda: state_of(desk, waited).state == "done")
-        assert [state_of(desk, job).state for job in (ran, draft)] == ["interrupted", "draft"]
+        there = {one.id: one.state for one in desk.store.all()}
+        assert [there[id_of(job)] for job in (ran, draft, killed)] == ["interrupted", "draft", "interrupted"]
+        assert len(there) == 4
         page = client_of(desk).get("/").text
         assert all(id_of(job) in page for job in (ran, waited, draft))
         assert "<polyline" in client_of(desk).get(draft).text
-
-
-def test_a_server_that_was_killed_left_jobs_that_can_be_read(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    job = store.new()
-    store.put(job.id, state="running")
-    (tmp_path / "20260101-000000-abcdef").mkdir()
-    with desk_at(tmp_path, serve_work.quickly) as desk:
-        assert [(one.id, one.state) for one in desk.store.all()] == [(job.id, "interrupted")]
 
 
 # The page on a disk without room: each form and upload is one sentence, nothing is half changed, the queue goes on.
@@ -173,9 +168,9 @@ def full(home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("action", FORMS)
-def test_a_form_on_a_full_disk_is_a_sentence_and_changes_nothing(
-    client: TestClient, desk: Desk, action: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_form_on_a_full_disk_is_a_sentence(client: TestClient, desk: Desk, action: str, monkeypatch: Any) -> None:
+    """It changes nothing."""
+
     def content() -> dict[Path, bytes]:
         return {one: one.read_bytes() for one in desk.store.home.rglob("*") if one.is_file()}
 
@@ -190,9 +185,8 @@ def test_a_form_on_a_full_disk_is_a_sentence_and_changes_nothing(
 
 
 @pytest.mark.parametrize("name", ["a.csv", "axis.toml"])
-def test_an_upload_or_a_draft_on_a_full_disk_is_a_sentence_and_leaves_nothing_and_removing_makes_room(
-    client: TestClient, desk: Desk, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_upload_or_draft_on_a_full_disk_leaves_nothing(client: Any, desk: Desk, name: str, monkeypatch: Any) -> None:
+    """Each is a sentence, and removing makes room."""
     job = new(client)
     with full(desk.store.home, monkeypatch):
         uploaded, drafted = put(client, job, name, recording()), client.post("/jobs")
@@ -204,9 +198,7 @@ def test_an_upload_or_a_draft_on_a_full_disk_is_a_sentence_and_leaves_nothing_an
     assert [*desk.store.home.iterdir()] == []
 
 
-def test_a_diagnosis_that_ends_on_a_full_disk_is_shown_as_it_is_and_the_next_one_has_its_turn(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_after_a_diagnosis_that_ends_on_a_full_disk_the_next_one_has_its_turn(tmp_path: Path, monkeypatch: Any) -> None:
     with desk_at(tmp_path / "data", serve_work.for_ever) as desk:
         client = client_of(desk)
         first, second = ready(client), ready(client)
@@ -221,9 +213,6 @@ def test_a_diagnosis_that_ends_on_a_full_disk_is_shown_as_it_is_and_the_next_one
             until(lambda: desk.queue.progress.id == id_of(second) and desk.queue.progress.answer)
         act(client, second, "cancel")
         assert state_of(desk, second).state == "cancelled"
-
-
-# Two diagnoses side by side: verdicts, effects, errors and overlays of both.
 
 
 @pytest.fixture

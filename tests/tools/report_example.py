@@ -12,6 +12,7 @@ from cosim.report import render
 
 RATE, SECONDS = 1000, 60
 FLOOR = 0.16
+KINDS = [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
 
 
 def motion(seed: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

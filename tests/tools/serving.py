@@ -1,7 +1,6 @@
 """Help for the tests of the page: a desk, a client that has the token, recordings and a card."""
 
 import atexit
-import http.client
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -74,15 +73,15 @@ def id_of(job: str) -> str:
     return job.rpartition("/")[2]
 
 
-def state(desk: Desk, job: str) -> Job:
+def state_of(desk: Desk, job: str) -> Job:
     return desk.store.get(id_of(job))
 
 
 def done(client: TestClient, desk: Desk, job: str, ends: str = "done") -> str:
     """The id of a job after its diagnosis."""
     act(client, job, "start")
-    until(lambda: not state(desk, job).live)
-    assert state(desk, job).state == ends
+    until(lambda: not state_of(desk, job).live)
+    assert state_of(desk, job).state == ends
     return id_of(job)
 
 
@@ -131,14 +130,10 @@ def listened(desk: Desk) -> Iterator[int]:
         listener.close()
 
 
-def asked(port: int, method: str, path: str, body: bytes = b"", seconds: float = 60.0) -> tuple[int, bytes]:
-    """The status and body of an answer to who has the token."""
-    client = http.client.HTTPConnection("127.0.0.1", port, timeout=seconds)
-    client.request(method, path, body, headers_to(port))
-    answer = client.getresponse()
-    text = answer.read()
-    client.close()
-    return answer.status, text
+def asked(port: int, method: str, path: str, body: bytes = b"", seconds: float = 60.0) -> int:
+    """The status of the answer to who has the token."""
+    address = f"http://127.0.0.1:{port}{path}"
+    return httpx2.request(method, address, content=body, headers=headers_to(port), timeout=seconds).status_code
 
 
 def headers_to(port: int) -> dict[str, str]:
