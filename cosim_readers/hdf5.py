@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.packages import is_table, left_out, vectors
+from cosim.data.binary.channels import is_table, left_out, vectors, with_clocks
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns, check_time, short
 from cosim.support.errors import RecordingError

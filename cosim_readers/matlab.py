@@ -11,8 +11,7 @@ from math import prod
 from pathlib import Path
 from typing import IO
 
-from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.packages import left_out, vectors
+from cosim.data.binary.channels import left_out, vectors, with_clocks
 from cosim.data.columns import Columns
 from cosim.data.limits import allowance, check_cells, check_time, check_unpacked, listed
 from cosim_readers import hdf5

@@ -18,26 +18,22 @@ from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
 from cosim.support.errors import RecordingError
 from cosim.support.plugins import READERS, loaded, names
-from cosim.support.suffixes import recordings
-
-__all__ = ["Columns", "read_columns", "suffix_of"]
+from cosim.support.suffixes import JSONS, TEXTS, recordings
 
 CONVERTED = {
     ".tdms": "a TDMS file of LabVIEW; write it as CSV with npTDMS (tdmsinfo, to_dataframe().to_csv) or DIAdem",
     ".ulg": "a log of PX4; write its topics as CSV with ulog2csv (pip install pyulog)",
     ".wpilog": "a log of WPILib; export it as CSV with AdvantageScope",
     ".hoot": "a log of CTRE Phoenix; convert it with owlet to .wpilog or MCAP, or export CSV with AdvantageScope",
-    ".bbl": "a log of Betaflight; write it as CSV with blackbox_decode",
-    ".bfl": "a log of Betaflight; write it as CSV with blackbox_decode",
     ".bin": "a binary file, perhaps a log of ArduPilot; write that as CSV with mavlogdump.py --format csv",
     ".svdx": "a project of TwinCAT Scope; export its channels as CSV in Scope View",
     ".mdf": "an older MDF file; convert it to MDF4 with asammdf",
     ".blf": "a log of a CAN bus; decode it with its DBC file to MDF4 or CSV (asammdf)",
-    ".xlsx": "a spreadsheet; save its table as CSV",
-    ".xls": "a spreadsheet; save its table as CSV",
-    ".ods": "a spreadsheet; save its table as CSV",
-    ".pkl": "a pickle, which is a program and is never loaded; save its table as Parquet or CSV",
-    ".pickle": "a pickle, which is a program and is never loaded; save its table as Parquet or CSV",
+    **dict.fromkeys((".bbl", ".bfl"), "a log of Betaflight; write it as CSV with blackbox_decode"),
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "a spreadsheet; save its table as CSV"),
+    **dict.fromkeys(
+        (".pkl", ".pickle"), "a pickle, which is a program and is never loaded; save its table as Parquet or CSV"
+    ),
     ".zip": "an archive; unpack it and give the recording in it",
 }
 """What a file of a suffix is that is not read here, and how it becomes one that is."""
@@ -110,22 +106,8 @@ def suffix_of(path: Path) -> str:
 
 
 _READERS: dict[str, Callable[..., Columns]] = {
-    ".csv": read_text,
-    ".csv.gz": read_text,
-    ".parquet": parquet.read,
-    ".json": json_records.read,
-    ".json.gz": json_records.read,
-    ".jsonl": json_records.read,
-    ".jsonl.gz": json_records.read,
-    ".ndjson": json_records.read,
-    ".npz": numpy_files.read,
-    ".npy": numpy_files.read,
-    ".txt": read_text,
-    ".txt.gz": read_text,
-    ".tsv": read_text,
-    ".dat": read_text,
-    ".log": read_text,
-    ".asc": read_text,
-    ".lvm": read_text,
+    **dict.fromkeys(TEXTS, read_text),
+    **dict.fromkeys(JSONS, json_records.read),
+    **{".parquet": parquet.read, ".npz": numpy_files.read, ".npy": numpy_files.read},
 }
 """Those that cannot crash or hang on a damaged file; what is plugged in has a process of its own."""

@@ -3,6 +3,7 @@
 `many.parquet:run=3` names it by a column, `many.csv:#3` by its number.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,23 +15,25 @@ from cosim.data.columns import Columns, Request
 from cosim.data.joining import on_one_time
 from cosim.data.limits import listed, short
 from cosim.data.order import in_order
-from cosim.data.questions import EMPTY, REPEATED
+from cosim.data.questions import EMPTY, PERIOD, REPEATED
 from cosim.data.runs import equal, split, starts, text_of
-from cosim.data.spacing import with_time
 from cosim.data.sparse import filled, without_empty
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
+from cosim.support.units import unit
 
 MANY = 1000
 """Values of a column beyond which it is a measurement, and no name of a recording."""
+SPACED = re.compile(r"([\d.]+(?:[eE][+-]?\d+)?)\s*(s|ms|us|ns)?")
+"""How far apart rows without a time are."""
 
 
 def rows_of_one(request: Request, found: Columns) -> Columns:
     """Return what a file holds as a table with one row for each time, and of many recordings the one that is named.
 
     Raises:
-        RecordingError: as `on_one_time`, `with_time` and `one_run`.
+        RecordingError: as `on_one_time` and `one_run`; or a period is none, or rows are missing.
     """
     rows = timed(request, found)
     one = one_run(request, rows)
@@ -40,12 +43,30 @@ def rows_of_one(request: Request, found: Columns) -> Columns:
 def timed(request: Request, found: Columns) -> Columns:
     """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
     _check_layout(request.layout)
-    return in_order(request, _full(request, with_time(on_one_time(request, found), request.layout)))
+    return in_order(request, _full(request, _with_time(on_one_time(request, found), request.layout)))
 
 
 def _full(request: Request, found: Columns) -> Columns:
     """Return a table whose rows have what is needed, as far as that is known."""
     return without_empty(request, filled(request, found))
+
+
+def _with_time(columns: Columns, layout: Mapping[str, str]) -> Columns:
+    """Return columns with a time `t` from 0, if `layout` has a period: rows without a time that were taken evenly."""
+    if PERIOD not in layout:
+        return columns
+    stated = layout[PERIOD]
+    found = SPACED.fullmatch(stated.strip())
+    period = float(found[1]) * unit(found[2] or "s").factor if found and found[1].count(".") < 2 else 0.0
+    if not 0 < period < np.inf:
+        text = f"--layout period={stated}: it is the time between two rows, for example 1ms or 0.001."
+        raise RecordingError(text, culprit=PERIOD, value=stated)
+    if columns.missing:
+        text = f"--layout period={stated} needs evenly spaced rows: {' '.join(columns.missing)}"
+        raise RecordingError(text, culprit=PERIOD, value=stated)
+    rows = len(next(iter(columns.values.values())))
+    values = {"t": np.arange(rows) * period} | {name: column for name, column in columns.values.items() if name != "t"}
+    return replace(columns, values=values, units=columns.units | {"t": "s"})
 
 
 def _check_layout(layout: Mapping[str, str]) -> None:

@@ -26,7 +26,6 @@ from cosim.data.runs import JOINT, exists, split
 from cosim.data.times import YEARS, read_clock
 from cosim.support.errors import RecordingError
 from cosim.support.files import sha256
-from cosim.support.units import unit
 
 BAGS = (".mcap", ".db3", ".bag")
 """Suffixes of bags: a folder of them is one that was split, and no run of a file for each quantity."""
@@ -108,7 +107,7 @@ def _part(path: Path, columns: Mapping[str, str], units: Mapping[str, str], layo
     clock = read_clock(path, found.values[name], name, stated, servo=True)
     if clock.values.dtype.kind not in "iuf":
         raise RecordingError(f'{path}: column "{short(name)}" holds no times.', culprit=str(path), value=name)
-    t = np.asarray(clock.values * (unit(clock.unit).factor if clock.unit else 1.0), np.float64)
+    t = clock.seconds
     rest = {key: column for key, column in found.values.items() if key != name}
     since = int(t[0]) if not clock.origin and len(t) and YEARS[0] <= t[0] <= YEARS[1] else 0
     notes = (*found.notes, *clock.notes)

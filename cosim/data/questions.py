@@ -33,6 +33,12 @@ def _cell(value: object) -> str:
     return f"{value:.7g}" if isinstance(value, float | np.floating) else short(str(value))
 
 
+def _question(
+    path: Path, text: str, deciding: dict[str, dict[str, str]], value: object, choices: tuple[str, ...] = ()
+) -> UndecidedError:
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=value, choices=choices)
+
+
 def ambiguous(path: Path, found: Columns, told: Guess) -> UndecidedError:
     """Ask which of several columns it is."""
     option = f"--columns {quote(f'{told.role}={told.among[0]}')}"
@@ -40,8 +46,7 @@ def ambiguous(path: Path, found: Columns, told: Guess) -> UndecidedError:
         f"{path}: {told.role} may be any of {listed(told.among)}; say which, for example {option}. "
         f"{first_rows(found.values, told.among)}"
     )
-    deciding = {"columns": {told.role: told.among[0]}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=told.role, choices=told.among)
+    return _question(path, text, {"columns": {told.role: told.among[0]}}, told.role, told.among)
 
 
 def current(path: Path, told: Guess) -> UndecidedError:
@@ -51,19 +56,16 @@ def current(path: Path, told: Guess) -> UndecidedError:
         f'{path} has no torque but a current, "{short(name)}". With the torque constant KT of the motor [N.m/A] it '
         f'becomes one: --columns {quote(f"tau={name}")} --units "tau=KT N.m", for example "tau=0.12 N.m".'
     )
-    deciding = {"columns": {"tau": name}, "units": {"tau": "1 N.m"}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=told.among)
+    return _question(path, text, {"columns": {"tau": name}, "units": {"tau": "1 N.m"}}, name, told.among)
 
 
 def share(path: Path, name: str, stated: str) -> UndecidedError:
     """Ask what one unit of a torque is that was recorded as a share of the rated one."""
     text = (
         f'{path}: "{short(name)}" is in {stated} of a torque that the file does not name; say how much one of it is, '
+        'for example --units "tau=0.04 N.m".'
     )
-    deciding = {"units": {"tau": "1 N.m"}}
-    return UndecidedError(
-        f'{text}for example --units "tau=0.04 N.m".', decided_by=deciding, culprit=str(path), value=name
-    )
+    return _question(path, text, {"units": {"tau": "1 N.m"}}, name)
 
 
 def counted(path: Path, role: str, name: str) -> UndecidedError:
@@ -73,8 +75,7 @@ def counted(path: Path, role: str, name: str) -> UndecidedError:
         f'{path}: "{short(name)}" is in counts{per_second}; say how large one is, for example --units '
         f'"{role}=0.0055 deg{per_second}" where a turn has 65,536 of them.'
     )
-    deciding = {"units": {role: f"1 rad{per_second}"}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name)
+    return _question(path, text, {"units": {role: f"1 rad{per_second}"}}, name)
 
 
 def scaled(path: Path, role: str, name: str, text: str) -> UndecidedError:
@@ -84,8 +85,7 @@ def scaled(path: Path, role: str, name: str, text: str) -> UndecidedError:
         f'{path}: "{short(name)}" is in {text}; say how much one {text} is, for example --units "{role}={one}", or '
         f"which other column is {role} with --columns."
     )
-    deciding = {"units": {role: f"1 {one.split()[1]}"}}
-    return UndecidedError(sentence, decided_by=deciding, culprit=str(path), value=text)
+    return _question(path, sentence, {"units": {role: f"1 {one.split()[1]}"}}, text)
 
 
 def two_units(path: Path, found: Columns, role: str, name: str, both: Sequence[str]) -> UndecidedError:
@@ -94,8 +94,7 @@ def two_units(path: Path, found: Columns, role: str, name: str, both: Sequence[s
         f'{path} states two units for "{short(name)}", {both[0]} and {both[1]}; say which it is in, --units '
         f"{quote(f'{role}={both[0]}')} or --units {quote(f'{role}={both[1]}')}. {first_rows(found.values, [name])}"
     )
-    deciding = {"units": {role: both[0]}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=tuple(both))
+    return _question(path, text, {"units": {role: both[0]}}, name, tuple(both))
 
 
 FITTING = {"tau": ("N.m", "mN.m"), "q": ("deg", "rad", "mm"), "v": ("rpm", "deg/s", "rad/s", "mm/s")}
@@ -109,8 +108,7 @@ def no_unit(path: Path, role: str, name: str, why: str) -> UndecidedError:
     text = (
         f'{path}: "{short(name)}" states no unit and {why}; say which it is in, for example --units {options}{number}.'
     )
-    deciding = {"units": {role: FITTING[role][0]}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=FITTING[role])
+    return _question(path, text, {"units": {role: FITTING[role][0]}}, name, FITTING[role])
 
 
 EXAMPLES = {"t": "ms", "tau": "mN.m", "q": "deg", "v": "deg/s", "q_d": "deg", "temperature": "degC"}
@@ -121,10 +119,8 @@ def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
     """Ask for the unit of a column whose own is not known."""
     option = EXAMPLES.get(role, "1")
     kind = "unit of time" if role == "t" else "unit known here"
-    column = f'"{short(text)}" of column "{short(name)}"'
-    told = f"{path}: {column} is no {kind}; say which it is in, for example "
-    deciding = {"units": {role: option}}
-    return UndecidedError(f"{told}--units {role}={option}.", decided_by=deciding, culprit=str(path), value=text)
+    told = f'{path}: "{short(text)}" of column "{short(name)}" is no {kind}; say which it is in, for example '
+    return _question(path, f"{told}--units {role}={option}.", {"units": {role: option}}, text)
 
 
 def may_serve(found: Columns, lacking: Sequence[str], free: Sequence[str]) -> bool:
@@ -150,8 +146,7 @@ def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[s
         f"{path} {has or f'does not name its {len(found.values)} columns'}; say which is which, for example "
         f"{' '.join(options)}. {first_rows(found.values)}"
     )
-    names, deciding = tuple(found.values), {"columns": columns, "layout": layout}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=len(names), choices=names)
+    return _question(path, text, {"columns": columns, "layout": layout}, len(found.values), tuple(found.values))
 
 
 def counting(path: Path, name: str, step: float, fitting: Sequence[str]) -> UndecidedError:
@@ -160,19 +155,18 @@ def counting(path: Path, name: str, step: float, fitting: Sequence[str]) -> Unde
     The example is the first unit that makes the step one of a servo.
     """
     unit = (*fitting, "ms")[0]
-    asked = (
-        f'{path}: "{short(name)}" steps by {step:.6g}; say what one is, for example --units t={unit}, or for samples'
+    text = (
+        f'{path}: "{short(name)}" steps by {step:.6g}; say what one is, for example --units t={unit}, or for samples '
+        'that are 0.5 ms apart --units "t=0.5 ms".'
     )
-    text = f'{asked} that are 0.5 ms apart --units "t=0.5 ms".'
-    return UndecidedError(text, decided_by={"units": {"t": unit}}, culprit=str(path), value=step)
+    return _question(path, text, {"units": {"t": unit}}, step)
 
 
 def rates(path: Path, name: str, step: float, fitting: Sequence[str], said: str) -> UndecidedError:
     """Ask for the unit of a time that may count in several, or in none that is known."""
     unit = (*fitting, "ms")[0]
     text = f'{path}: "{short(name)}" steps by {step:.6g}, which is {said}. Say which with --units t={unit}.'
-    deciding = {"units": {"t": unit}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step, choices=tuple(fitting))
+    return _question(path, text, {"units": {"t": unit}}, step, tuple(fitting))
 
 
 def too_fast(path: Path, name: str, step: float) -> UndecidedError:
@@ -181,8 +175,7 @@ def too_fast(path: Path, name: str, step: float) -> UndecidedError:
         f'{path}: "{short(name)}" steps by {step:.3g}, which is {1 / step:.3g} Hz in seconds and '
         f"{1 / (step * 86_400):.4g} Hz in days. Say which with --units t=day, or --units t=s."
     )
-    deciding = {"units": {"t": "day"}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step, choices=("day", "s"))
+    return _question(path, text, {"units": {"t": "day"}}, step, ("day", "s"))
 
 
 def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
@@ -193,23 +186,19 @@ def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
     text = (
         f"{message} It is written with too few digits; if the rows are evenly spaced, say --layout {PERIOD}={period}."
     )
-    deciding = {"layout": {PERIOD: period}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step)
+    return _question(path, text, {"layout": {PERIOD: period}}, step)
 
 
 def empty(path: Path, name: str, said: str) -> UndecidedError:
     """Ask what becomes of rows in which a column that is needed has no value."""
     text = f'{path}: column "{short(name)}" holds {said}. --layout {EMPTY}=gap leaves such rows out: a gap in time.'
-    return UndecidedError(text, decided_by={"layout": {EMPTY: "gap"}}, culprit=str(path), value=name)
+    return _question(path, text, {"layout": {EMPTY: "gap"}}, name)
 
 
 def repeated(path: Path, message: str) -> UndecidedError:
     """Ask which of several rows of one time is the reading; `message` says how they differ."""
     text = f"{message} Leave one of the two out: --layout {REPEATED}=first keeps the first of them, last the last."
-    choices = ("first", "last")
-    return UndecidedError(
-        text, decided_by={"layout": {REPEATED: "first"}}, culprit=str(path), value=REPEATED, choices=choices
-    )
+    return _question(path, text, {"layout": {REPEATED: "first"}}, REPEATED, ("first", "last"))
 
 
 def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:
@@ -220,7 +209,7 @@ def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> Undec
     deciding |= {"units": {"t": unit}} if unit else {}
     example = f" (for example {typed}{f' --units t={unit}' if unit else ''})" if growing else ""
     text = f"{message}{example} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms. {first_rows(values)}"
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
+    return _question(path, text, deciding, "t", tuple(values))
 
 
 def time_by_speed(path: Path, stated: str, fitting: str, name: str, what: str = "the slope") -> UndecidedError:
@@ -232,8 +221,7 @@ def time_by_speed(path: Path, stated: str, fitting: str, name: str, what: str = 
         f'{path} states its time in {stated}, but "{short(name)}" is {what} of the position only in {fitting}; say '
         f"which it is, --units t={fitting} or --units t={stated}."
     )
-    deciding = {"units": {"t": fitting}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=stated, choices=(fitting, stated))
+    return _question(path, text, {"units": {"t": fitting}}, stated, (fitting, stated))
 
 
 def position_by_speed(
@@ -245,8 +233,7 @@ def position_by_speed(
         f'{path}: "{short(name)}" is {what} of the position only if that is in {fitting}, and the file {states}; '
         f"say which it is, --units {quote(f'q={fitting}')} or --units q=rad. {first_rows(values, ['t', 'q', name])}"
     )
-    deciding = {"units": {"q": fitting}}
-    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=fitting)
+    return _question(path, text, {"units": {"q": fitting}}, fitting)
 
 
 def _is_measured(column: np.ndarray) -> bool:

@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data import held
-from cosim.data.arrays import as_columns, sha256_of
 from cosim.data.assign import assign
 from cosim.data.assumed import assumed
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
-from cosim.data.columns import Columns, Request
+from cosim.data.columns import Columns, Request, as_columns, sha256_of
 from cosim.data.one_run import rows_of_one, timed
 from cosim.data.parts import options_within, read_run
 from cosim.data.registers import at_an_end, continued

@@ -9,8 +9,8 @@ temperature  temperature
 """
 
 import re
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 
 from cosim.data.text.names import words_of
 from cosim.data.text.unit_words import is_unit, spelled
@@ -40,22 +40,8 @@ STEMS: dict[str, Names] = {
     "acceleration": ("accel", "beschleunigung"),
     "asked": ("soll", "goal", "setpoint", "command", "reference", "desired", "target", "demand"),
     "wrong": (
-        "error",
-        "fehler",
-        "abweichung",
-        "deviation",
-        "schlepp",
-        "following",
-        "residual",
-        "limit",
-        "grenz",
-        "status",
-        "enable",
-        "valid",
-        "ready",
-        "alarm",
-        "inpos",
-        "gain",
+        *("error", "fehler", "abweichung", "deviation", "schlepp", "following", "residual", "limit", "grenz"),
+        *("status", "enable", "valid", "ready", "alarm", "inpos", "gain"),
     ),
     "measured": ("actual", "meas", "feedback", "istwert", "estimate"),
 }
@@ -106,8 +92,13 @@ def guess(role: str, names: Collection[str], units: Mapping[str, str]) -> Guess:
 
     Where some of the columns that are named for it are in a unit that becomes ours, the others are none of it.
     """
-    named = _GUESSES[role]([name for name in names if name], units)
-    return replace(named, among=tuple(name for name in named.among if suits(role, units.get(name, ""))) or named.among)
+    names = [name for name in names if name]
+    among, is_current = next(filter(None, _candidates(role, names, units)), ()), False
+    if role == "tau" and not among:
+        currents = (name for name in names if _is(name, "current", "!wrong", "!speed") and not OF_FLUX.search(name))
+        among = _first(tuple(currents), "asked")
+        is_current = bool(among)
+    return Guess(role, tuple(name for name in among if suits(role, units.get(name, ""))) or among, is_current)
 
 
 def suits(role: str, text: str) -> bool:
@@ -163,55 +154,32 @@ _SPEED = ("speed", "!asked", "!wrong", "!current", "!voltage", "!torque", "!acce
 _POSITION = ("position", "!wrong", "!speed", "!torque", "!current", "!voltage", "!acceleration", "!temperature")
 
 
-def _time(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    exact = tuple(name for name in names if name.lower() in ("t", "time"))
-    named = tuple(name for name in names if _is(name, "time", "!wrong"))
-    for among in (exact, named, _of_unit(names, units, "s")):
-        if among:
-            return Guess("t", among)
-    return Guess("t")
+def _candidates(role: str, names: Collection[str], units: Mapping[str, str]) -> Iterator[Names]:
+    """What may serve as a role, the best first; each is taken only where those before it are empty."""
 
+    def of(*kinds: str) -> Names:
+        return tuple(name for name in names if _is(name, *kinds))
 
-def _torque(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if _is(name, "torque", "!wrong", "!temperature"))
-    asked = tuple(name for name in named if _is(name, "asked"))
-    current = tuple(name for name in names if _is(name, "current", "!wrong", "!speed") and not OF_FLUX.search(name))
-    for among in (asked, named, _of_unit(names, units, "N.m", "N")):
-        if among:
-            return Guess("tau", among)
-    return Guess("tau", _first(current, "asked"), current=True) if current else Guess("tau")
-
-
-def _position(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if _is(name, *_POSITION, "!asked"))
-    plain = [name for name in names if _is(name, "!asked", "!wrong")]
-    return Guess("q", _first(named, "measured") or _of_unit(plain, units, "rad", "m"))
-
-
-def _set_point(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    return Guess("q_d", tuple(name for name in names if _is(name, *_POSITION, "asked")))
-
-
-def _speed(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if is_speed(name) and suits("v", units.get(name, "")))
-    plain = [name for name in names if _is(name, "!asked", "!wrong")]
-    return Guess("v", _first(named, "measured") or _of_unit(plain, units, "rad/s", "m/s"))
-
-
-def _temperature(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    return Guess("temperature", tuple(name for name in names if _is(name, "temperature")))
+    if role == "t":
+        yield tuple(name for name in names if name.lower() in ("t", "time"))
+        yield of("time", "!wrong")
+        yield _of_unit(names, units, "s")
+    elif role == "tau":
+        yield of("torque", "!wrong", "!temperature", "asked")
+        yield of("torque", "!wrong", "!temperature")
+        yield _of_unit(names, units, "N.m", "N")
+    elif role == "q":
+        yield _first(of(*_POSITION, "!asked"), "measured")
+        yield _of_unit(of("!asked", "!wrong"), units, "rad", "m")
+    elif role == "q_d":
+        yield of(*_POSITION, "asked")
+    elif role == "v":
+        yield _first(tuple(name for name in of(*_SPEED) if suits("v", units.get(name, ""))), "measured")
+        yield _of_unit(of("!asked", "!wrong"), units, "rad/s", "m/s")
+    elif role == "temperature":
+        yield of("temperature")
 
 
 def _first(names: Names, kind: str) -> Names:
     """Return the names of a kind if there are any, else all."""
     return tuple(name for name in names if _is(name, kind)) or names
-
-
-_GUESSES: dict[str, Callable[[Collection[str], Mapping[str, str]], Guess]] = {
-    "t": _time,
-    "tau": _torque,
-    "q": _position,
-    "v": _speed,
-    "q_d": _set_point,
-    "temperature": _temperature,
-}

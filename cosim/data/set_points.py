@@ -60,16 +60,6 @@ class SetPoint(SignalSection):
     def motion(self, t: np.ndarray) -> Motion:
         """Return position, velocity and acceleration, each of the shape of t [s]."""
 
-    @property
-    def fastest(self) -> float:
-        """The greatest frequency that is asked for [Hz]; 0 where none is named."""
-        return 0.0
-
-    @property
-    def tones(self) -> int:
-        """How many sines it adds at each tick."""
-        return 1
-
     def stream(self, step: float) -> Stream:
         """Make a stream of the motion."""
         return in_pieces(lambda t: np.stack(envelope(self.motion(t), t, self.smooth_start)), step)
@@ -91,9 +81,9 @@ class Sine(SetPoint):
         return self
 
     @property
-    def fastest(self) -> float:
-        """Its frequency."""
-        return self.frequency
+    def frequencies(self) -> list[float]:
+        """Its frequency [Hz]."""
+        return [self.frequency]
 
     def motion(self, t: np.ndarray) -> Motion:
         """Return the sine and its derivatives."""
@@ -172,16 +162,6 @@ class Multisine(SetPoint):
             raise ValueError(f"{len(self.amplitudes)} amplitudes for {len(self.frequencies)} frequencies")
         return self
 
-    @property
-    def fastest(self) -> float:
-        """The greatest of its frequencies."""
-        return max(self.frequencies)
-
-    @property
-    def tones(self) -> int:
-        """One for each frequency."""
-        return len(self.frequencies)
-
     def motion(self, t: np.ndarray) -> Motion:
         """Return the sum and its derivatives."""
         count = len(self.frequencies)
@@ -200,9 +180,9 @@ class Chirp(SetPoint):
     amplitude: float
 
     @property
-    def fastest(self) -> float:
-        """The frequency at the end or at the start."""
-        return max(self.start, self.stop)
+    def frequencies(self) -> list[float]:
+        """Those at both ends [Hz]."""
+        return [self.start, self.stop]
 
     def motion(self, t: np.ndarray) -> Motion:
         """Return the chirp and its derivatives; the frequency has a kink at `duration`."""

@@ -38,11 +38,11 @@ def check_signal(name: str, signal: Signal, step: float, ticks: int) -> None:
     Raises:
         SignalError: a frequency is half of that of the ticks, or above; or it adds too many sines in a run of `ticks`.
     """
-    fastest, limit = getattr(signal, "fastest", 0.0), 0.5 / step
+    frequencies, limit = getattr(signal, "frequencies", ()), 0.5 / step
+    fastest, tones = max(frequencies, default=0.0), len(frequencies)
     if fastest >= limit:
         rule = f"at a step of {step:g} s it must stay below {limit:g} Hz"
         raise SignalError(f'The signal "{name}" has {fastest:g} Hz; {rule}.', culprit=name, value=fastest)
-    tones = getattr(signal, "tones", 1)
     if tones * ticks > MOST_SINES and tones > FEW_SINES:
         rule = f"in {ticks:,} steps that is {tones * ticks:.3g} sines, and {MOST_SINES:.3g} are the most"
         way = 'Take fewer, a shorter run, or replay the sum from a recording (kind = "recorded")'

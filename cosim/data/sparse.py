@@ -22,7 +22,6 @@ from cosim.data.limits import LARGEST, listed
 from cosim.data.order import order_of
 from cosim.data.questions import EMPTY, PERIOD
 from cosim.data.times import read_clock
-from cosim.support.units import unit
 
 SPARSE = 0.2
 """Share of the rows without a value from which on they are no invalid samples: the column has times of its own."""
@@ -44,8 +43,7 @@ def filled(request: Request, found: Columns) -> Columns:
     clock = read_clock(request.path, served.values["t"], name, served.units.get("t", ""), servo=bool(request.required))
     if clock.values.dtype.kind not in "iuf":
         return found
-    size = unit(clock.unit).factor if clock.unit else 1.0
-    t = size * clock.values.astype(np.float64)
+    t = clock.seconds
     there = {key: np.isfinite(one) for key, one in found.values.items() if key != name and one.dtype.kind in "fiub"}
     if any(_begins_again(t, found, served.sources[one], there) for one in needed):
         return found  # several recordings: each is filled when it is taken
@@ -62,7 +60,7 @@ def filled(request: Request, found: Columns) -> Columns:
     joined = on_one_time(replace(request, columns=said, units=scales), parted)
     if "t" not in joined.values:
         return found
-    own = joined.values["t"] / size if "t" in units else joined.values["t"]
+    own = joined.values["t"] / clock.size if "t" in units else joined.values["t"]
     values = {name: own} | {key: one for key, one in joined.values.items() if key != "t"}
     return replace(joined, values=values, units=joined.units | {name: clock.unit if "t" in units else "s"})
 

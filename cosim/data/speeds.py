@@ -4,6 +4,12 @@
 
 k = 1 where time, position and speed are in the units that were taken. Another k that is a ratio of units says which of
 them was taken wrongly: 1000 is a time in ms, 57.3 a speed in degrees a second, .0175 a position in degrees.
+
+Where no speed was recorded, a measured acceleration tells the units of time and position:
+
+    a = k d2q/dt2,  k from increments of the mean speed and integrals of a between the middles of equal parts
+
+A time that is counted in s but is in ms makes k = 1e6, a position in degrees that is taken for rad k = .0175.
 """
 
 from collections.abc import Mapping
@@ -14,7 +20,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data import questions
-from cosim.data.accelerations import check_acceleration
 from cosim.data.assign import OURS, Assigned, units_stated
 from cosim.data.columns import Columns
 from cosim.data.limits import LARGEST, listed, short
@@ -29,16 +34,23 @@ PARTS = 400
 """Parts of a recording over which increments are taken: short beside a motion, long beside a step of an encoder."""
 LEAST = 20
 """Rows that are needed."""
+BENDS, LEAST_BENDS = 200, 20
+"""Parts over which mean speeds are taken for an acceleration, how many and the rows that each needs: an encoder's step
+is small beside its motion."""
 FOLLOWS = 0.95
 """Share of the energy of its integrals that the slope of the position explains of a column that is its speed."""
 NEAR = 0.025
 """Relative error within which k is a ratio of units: rev/s and a sixth, which is degrees beside rpm, differ by 5 %."""
+BENDS_FOLLOW, BENDS_NEAR = 0.9, 0.1
+"""The same share, and the same error, of an acceleration."""
 REPEATS = 0.98
 """Share of a torque or current that the torque explains where it is the torque again, as a diagnosis takes it."""
 KEPT = "_original"
 """End of the name of a column whose own name was given to another: it is kept, as was promised."""
 POSITIONS = {"rad": ("deg", "rev", "mrad", "0.001 deg", "arcsec", "arcmin", "urad"), "m": ("mm", "um")}
-"""Units in which positions are recorded, by what they become."""
+"""Units in which positions are recorded, by what they become, the usual ones first ..."""
+USUAL = 3
+"""... so many, which an acceleration tells apart."""
 SPEEDS = {
     "rad": ("deg/s", "rpm", "rev/s", "mrad/s", "0.001 deg/s", "arcsec/s"),
     "m": ("mm/s", "m/min", "mm/min", "um/s"),
@@ -87,7 +99,7 @@ def with_speed(path: Path, found: Columns, served: Assigned, given: Mapping[str,
         best = max(speeds, key=lambda one: _rank(found, one), default=None)
         served = _chosen(path, found, served, given, best) if best else served
     if not speeds:
-        check_acceleration(path, found, served, given)
+        _check_accelerations(path, found, served, given)
     again = tuple(one.name for one in speeds if one.name in served.values and one.name != "v")
     others = [name for name in served.values if name not in (*OURS, *again) and not name.endswith(KEPT)]
     again += tuple(name for name in others if _is_torque_again(served, name))
@@ -104,9 +116,14 @@ def _is_numeric(column: np.ndarray) -> bool:
     return column.dtype.kind in "fiu"
 
 
-def _may_be_speed(found: Columns, name: str) -> bool:
+def _si_unit(found: Columns, name: str) -> str:
+    """Return what the unit of a column becomes in SI; empty where none that is known is stated."""
     text = units_stated(found, name)
-    kind = unit(spelled(text)).si if is_known(text) else ""
+    return unit(spelled(text)).si if is_known(text) else ""
+
+
+def _may_be_speed(found: Columns, name: str) -> bool:
+    kind = _si_unit(found, name)
     measured = not is_named(name, "asked", "wrong")
     return (kind in ("rad/s", "m/s") and measured) or (is_speed(name) and kind in ("", "1", "1/s"))
 
@@ -123,7 +140,7 @@ def _speed(path: Path, found: Columns, served: Assigned, name: str) -> Speed | N
     clock = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False)
     if clock.values.dtype == object:
         return None
-    t = clock.values.astype(np.float64) * (unit(clock.unit).factor if clock.unit else 1.0)
+    t = clock.seconds
     turned, _ = continued(path.stem, {"q": served.values["q"].astype(np.float64)}, served.units)
     q, v = _si(turned["q"], served.units.get("q", "")), _si(served.values[name], _unit_of(found, served, name))
     good = np.isfinite(t) & (np.abs(q) < LARGEST) & (np.abs(v) < LARGEST)
@@ -146,9 +163,13 @@ def times_slope(t: Array, q: Array, v: Array) -> tuple[float, float]:
     way = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
     moved, integral, lasted = np.diff(q[edges]), np.diff(way[edges]), np.diff(t[edges])
     whole = (lasted > 0) & (lasted < 3 * np.median(lasted))
-    moved, integral = moved[whole], integral[whole]
+    return _ratio(moved[whole], integral[whole]) if whole.sum() >= LEAST / 2 else (0.0, 0.0)
+
+
+def _ratio(moved: Array, integral: Array) -> tuple[float, float]:
+    """Return k of integral = k moved, and the share of the energy that it explains; 0 where either never changes."""
     energy, own = float(integral @ integral), float(moved @ moved)
-    if len(moved) < LEAST / 2 or energy <= 0 or own <= 0:
+    if energy <= 0 or own <= 0:
         return 0.0, 0.0
     k = float(integral @ moved) / own
     left = integral - k * moved
@@ -215,8 +236,8 @@ def _of_ratio(units: Mapping[str, tuple[str, ...]], family: str, ratio: float) -
     return next((name for name in names if _near(ratio * unit(name).factor, 1.0)), "")
 
 
-def _near(value: float, wanted: float) -> bool:
-    return abs(value - wanted) <= NEAR * wanted
+def _near(value: float, wanted: float = 1.0, within: float = NEAR) -> bool:
+    return abs(value - wanted) <= within * wanted
 
 
 def _is_torque_again(served: Assigned, name: str) -> bool:
@@ -228,3 +249,47 @@ def _is_torque_again(served: Assigned, name: str) -> bool:
     if good.sum() < LEAST or np.ptp(column[good]) == 0 or np.ptp(tau[good]) == 0:
         return False
     return float(np.corrcoef(column[good], tau[good])[0, 1] ** 2) > REPEATS
+
+
+def _check_accelerations(path: Path, found: Columns, served: Assigned, given: Mapping[str, str]) -> None:
+    """Ask for the unit of the time or the position where a measured acceleration says that it is another."""
+    for name in (one for one in served.values if one not in OURS):
+        kind = _position_of(found, name)
+        if not kind or not all(_is_sound(served.values[one]) for one in ("t", "q", name)):
+            continue
+        stated = served.units.get("q", "")
+        q, a = _si(served.values["q"], stated), _si(served.values[name], units_stated(found, name))
+        clock = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False)
+        k = _times_bend(clock.seconds, q, a)
+        if _near(k, within=BENDS_NEAR):
+            continue
+        sizes = {key: k * (one / clock.size) ** 2 for key, one in SECONDS.items() if key != "s"}
+        fitting = next((key for key, one in sizes.items() if _near(one, within=BENDS_NEAR)), "")
+        if fitting and "t" not in given:
+            raise questions.time_by_speed(path, clock.unit or "s", fitting, name, "the second derivative")
+        usual = POSITIONS[kind][:USUAL]
+        position = next((one for one in usual if _near(k / unit(one).factor, within=BENDS_NEAR)), "")
+        if position and not stated and "q" not in given:
+            raise questions.position_by_speed(path, name, position, False, served.values, "the second derivative")
+
+
+def _position_of(found: Columns, name: str) -> str:
+    """Return what the position of a measured acceleration is in, rad or m; empty of any other column."""
+    kind = {"rad/s2": "rad", "m/s2": "m"}.get(_si_unit(found, name), "")
+    return kind if not is_named(name, "asked", "wrong") else ""
+
+
+def _is_sound(column: np.ndarray) -> bool:
+    return _is_numeric(column) and bool((np.abs(column) < LARGEST).all())
+
+
+def _times_bend(t: Array, q: Array, a: Array) -> float:
+    """Return k of a = k d2q/dt2; 0 where the position does not explain the acceleration."""
+    edges = np.unique(np.linspace(0, len(t) - 1, min(BENDS, len(t) // LEAST_BENDS) + 1).astype(int))
+    lasted = np.diff(t[edges])
+    if len(edges) < LEAST_BENDS or (lasted <= 0).any():
+        return 0.0
+    middles = 0.5 * (t[edges][1:] + t[edges][:-1])
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))])
+    k, follows = _ratio(np.diff(np.diff(q[edges]) / lasted), np.diff(np.interp(middles, t, way)))
+    return k if follows > BENDS_FOLLOW else 0.0

@@ -6,6 +6,7 @@ to one, or by less than 20 us as the days of a spreadsheet do, it is refused and
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from cosim.data import questions
 from cosim.data.limits import short
 from cosim.data.roles import is_named
 from cosim.data.text.unit_words import is_unit
+from cosim.support import units
 
 SLOWEST, FASTEST = 10.0, 50e3
 """Rates at which servos are sampled [Hz]."""
@@ -40,6 +42,16 @@ class Clock:
     start: str = ""
     notes: tuple[str, ...] = ()
     origin: int = 0
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """The time stamps in seconds; a unit that is not stated is seconds."""
+        return np.asarray(self.values * self.size, np.float64)
+
+    @property
+    def size(self) -> float:
+        """Seconds of one unit."""
+        return units.unit(self.unit).factor if self.unit else 1.0
 
 
 def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bool) -> Clock:
@@ -96,15 +108,12 @@ def _pointed(text: str) -> str:
 def _of_stamps(column: np.ndarray) -> Clock:
     """Return seconds since the first stamp; clocks of a day go on past midnight."""
     missing = np.isnat(column)
-    seconds = (
-        np.where(missing, np.nan, (column - column[~missing][:1]).astype(np.int64) * 1e-9)
-        if (~missing).any()
-        else column
-    )
+    valid = column[~missing]
+    seconds = np.where(missing, np.nan, (column - valid[:1]).astype(np.int64) * 1e-9) if len(valid) else column
     if column.dtype.kind == "m":
         seconds = seconds + DAY * np.cumsum(np.concatenate([[0], np.diff(seconds) < -DAY / 2]))
     start = str(column[0].astype("datetime64[ms]")) if column.dtype.kind == "M" and not missing[0] else ""
-    origin = int(column[~missing][0].astype("datetime64[ns]").astype(np.int64)) if start else 0
+    origin = int(valid[0].astype("datetime64[ns]").astype(np.int64)) if start else 0
     return Clock(np.asarray(seconds, dtype=np.float64), "s", start, origin=origin)
 
 
@@ -116,15 +125,12 @@ def check_slow(path: Path, column: np.ndarray, name: str, stated: str) -> None:
     """
     if stated or column.dtype.kind not in "iuf" or len(column) < 2 or _of_date(column):
         return
-    values = column.astype(np.float64)
-    steps = np.diff(values[np.isfinite(values)])
-    step = float(np.median(steps)) if len(steps) else 0.0
+    values, _, step = _steps(column)
     if step >= 1 and not _is_since_1970(values):
         if not is_named(name, "time"):
             raise questions.counting(path, name, step, _fitting(step))
         fitting = _fitting(step)
-        said = " or ".join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in ("s", *fitting))
-        raise questions.rates(path, name, step, [*fitting, "s"], said)
+        raise questions.rates(path, name, step, [*fitting, "s"], _rates(step, ("s", *fitting)))
 
 
 def _is_since_1970(values: np.ndarray) -> bool:
@@ -144,16 +150,13 @@ def _fitting(step: float) -> list[str]:
 
 def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     """Return the unit that makes the steps of a column those of a servo; seconds wherever they can be."""
-    values = column.astype(np.float64)
-    steps = np.diff(values[np.isfinite(values)])
-    step = float(np.median(steps)) if len(steps) else 0.0
+    values, steps, step = _steps(column)
     if step > 0 and float(np.max(steps)) < 1 / FASTEST:
         raise questions.too_fast(path, name, step)
     if step <= 1 / SLOWEST:
         return ""
     if step < 1:
-        said = f"{1 / step:.4g} Hz in s and {1 / (step * SECONDS['ms']):.4g} Hz in ms"
-        raise questions.rates(path, name, step, ("ms", "s"), said)
+        raise questions.rates(path, name, step, ("ms", "s"), _rates(step, ("s", "ms"), " and "))
     if not is_named(name, "time") and not is_unit(name):
         raise questions.counting(path, name, step, _fitting(step))
     span = float(np.nanmax(values) - np.nanmin(values))
@@ -161,8 +164,18 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     lasting = [unit for unit in fitting if span * SECONDS[unit] >= SHORTEST] or fitting
     if len(lasting) == 1:
         return lasting[0]
-    said = " or ".join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in lasting or SECONDS)
-    raise questions.rates(path, name, step, lasting, said)
+    raise questions.rates(path, name, step, lasting, _rates(step, lasting or SECONDS))
+
+
+def _steps(column: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return a column as doubles, its steps where it has values, and their median."""
+    values = column.astype(np.float64)
+    steps = np.diff(values[np.isfinite(values)])
+    return values, steps, float(np.median(steps)) if len(steps) else 0.0
+
+
+def _rates(step: float, units: Iterable[str], joint: str = " or ") -> str:
+    return joint.join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in units)
 
 
 def _unit_note(path: Path, column: np.ndarray, name: str, unit: str) -> tuple[str, ...]:
@@ -182,9 +195,6 @@ def _since_first(column: np.ndarray, unit: str) -> tuple[np.ndarray, str, int]:
     if unit in ("ms", "us", "ns") and YEARS[0] <= float(first) * SECONDS[unit] <= YEARS[1]:
         ticks = int(float(first) * SECONDS[unit] * 1e3)
         origin = int(first) * round(SECONDS[unit] / SECONDS["ns"])
-        return (
-            np.asarray(column - column.dtype.type(int(first)), dtype=np.float64),
-            str(np.datetime64(ticks, "ms")),
-            origin,
-        )
+        since = np.asarray(column - column.dtype.type(int(first)), dtype=np.float64)
+        return since, str(np.datetime64(ticks, "ms")), origin
     return np.asarray(column, dtype=np.float64), "", 0

@@ -2,10 +2,9 @@
 
 from cosim.support.plugins import READERS, names
 
-OURS = (
-    *(".csv", ".csv.gz", ".tsv", ".txt", ".txt.gz", ".log", ".dat", ".asc", ".lvm"),
-    *(".json", ".json.gz", ".jsonl", ".jsonl.gz", ".ndjson", ".parquet", ".npz", ".npy"),
-)
+TEXTS = (".csv", ".csv.gz", ".tsv", ".txt", ".txt.gz", ".log", ".dat", ".asc", ".lvm")
+JSONS = (".json", ".json.gz", ".jsonl", ".jsonl.gz", ".ndjson")
+OURS = (*TEXTS, *JSONS, ".parquet", ".npz", ".npy")
 
 
 def recordings() -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data import limits
-from cosim.data.binary import numpy_files, packages
+from cosim.data.binary import channels, numpy_files
 from cosim.data.binary import parquet as parquet_files
 from cosim.data.limits import Allowance, allowed_by, check_cells, check_columns, check_text, check_unpacked, within
 from cosim.data.recording import Recording
@@ -155,10 +155,10 @@ def test_vectors_and_tables_of_a_package_count_together(rows: int, fits: bool) -
     found = {"t": np.arange(float(rows)), "q": np.ones((rows, 2)), "gains": np.ones(7), "name": np.array(["run"])}
     with within(allowing(100)):
         if fits:
-            assert packages.vectors(PATH, found).keys() == {"t", "q_1", "q_2"}
+            assert channels.vectors(PATH, found).keys() == {"t", "q_1", "q_2"}
             return
         with pytest.raises(RecordingError, match="34 rows of 3 columns"):
-            packages.vectors(PATH, found)
+            channels.vectors(PATH, found)
 
 
 @pytest.mark.parametrize(("depth", "fits"), [(hdf5.DEEPEST, True), (hdf5.DEEPEST + 1, False)])

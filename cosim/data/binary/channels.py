@@ -1,18 +1,19 @@
-"""Named arrays as channels with times of their own: a vector of time for each channel, or for each device."""
+"""The arrays of a file as a table of those that have one length, or as channels with times of their own.
+
+A vector of time may belong to each channel, or to each device.
+"""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from cosim.data.binary.packages import as_columns, is_table
-from cosim.data.clocks import grouped, owners
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, listed
 from cosim.data.roles import is_named
-from cosim.data.text.own_times import seconds
+from cosim.data.text.own_times import grouped, owners, seconds
 
 PLAIN = ("data", "value", "values", "val", "y", "signal", "samples")
 """Names of the values of a channel that has its name from its group."""
@@ -20,6 +21,8 @@ GROWS = 0.8
 """Share of the steps of a time that are positive: a few samples may stand twice or be late."""
 MOST = 200
 """Vectors of time of one file: each is compared with each channel."""
+MOST_BESIDE = 100
+"""Signals of one table: of two dimensions the longer one is time, as tools for simulation log to arrays."""
 
 
 def with_clocks(path: Path, found: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Columns | None:
@@ -81,3 +84,42 @@ def _short(names: Sequence[str]) -> dict[str, str]:
     last = {name: grouped(text)[1] for name, text in telling.items()}
     often = Counter(last.values())
     return {name: text if often[text] == 1 else name for name, text in last.items()}
+
+
+def is_table(shape: tuple[int, ...]) -> bool:
+    """Whether an array holds several signals beside each other."""
+    return len(shape) == 2 and 1 < min(shape) <= MOST_BESIDE and max(shape) > min(shape)
+
+
+def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Keep the numeric vectors that have the commonest length longer than one; a table is its columns, `data_1` ...
+
+    A table counts once: many columns of gains must not outnumber the few vectors of a recording.
+    """
+    signals = {name: as_columns(value) for name, value in found.items() if value.dtype.kind in "fiub"}
+    lengths = Counter(len(one) for one in signals.values() if len(one) > 1)
+    rows = lengths.most_common(1)[0][0] if lengths else 0
+    kept = {name: value for name, value in signals.items() if len(value) == rows}
+    check_cells(path, rows, sum(value.shape[1] for value in kept.values()))
+    return {
+        f"{name}_{k + 1}" if is_table(value.shape) else name: np.asarray(value[:, k], dtype=np.float64)
+        for name, value in kept.items()
+        for k in range(value.shape[1])
+    }
+
+
+def left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) -> tuple[str, ...]:
+    """Note the arrays of numbers that `vectors` did not keep; a number alone is a setting and needs no note."""
+    numeric = [name for name, value in found.items() if value.dtype.kind in "fiub" and value.size > 1]
+    lost = [name for name in numeric if name not in kept and f"{name}_1" not in kept]
+    shapes = [f"{name} ({' x '.join(map(str, found[name].shape))})" for name in lost]
+    return (f"{path.stem}: arrays of other lengths were left out: {listed(tuple(shapes))}.",) if shapes else ()
+
+
+def as_columns(value: np.ndarray) -> np.ndarray:
+    """Signals of an array as columns (rows, k); none of what is neither a vector nor a table."""
+    if value.ndim == 1:
+        return value[:, None]
+    if not is_table(value.shape):
+        return np.empty((0, 0))
+    return value if len(value) > value.shape[1] else value.T

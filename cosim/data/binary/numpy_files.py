@@ -14,8 +14,7 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.packages import is_table, left_out, vectors
+from cosim.data.binary.channels import is_table, left_out, vectors, with_clocks
 from cosim.data.columns import Columns
 from cosim.data.limits import check_columns, check_unpacked, listed
 from cosim.support.errors import RecordingError

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.channels import with_clocks
-from cosim.data.binary.packages import left_out, vectors
+from cosim.data.binary.channels import left_out, vectors, with_clocks
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import NUMBER, check_cells, check_unpacked, short
 from cosim.data.text.table import as_array

@@ -41,7 +41,6 @@ def without_units(path: Path, data: bytes, lines: Sequence[str]) -> tuple[bytes,
         if len(whole) < LEAST or len(whole) < MOST * len(rows):
             continue
         columns = zip(*(row for row in whole if len(row) == len(whole[0])), strict=True)
-        columns = zip(*(row for row in whole if len(row) == len(whole[0])), strict=True)
         units = tuple(next((spelled(text) for _, text in column if text), "") for column in columns)
         return _numbers(path, data, separator, units), units
     return data, ()

@@ -20,18 +20,8 @@ from cosim.support.numbers import whole
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "bar": "|"}
 DECIMALS = {"point": ".", "comma": ","}
-DIALECTS = (
-    (",", "."),
-    (";", "."),
-    (";", ","),
-    ("\t", "."),
-    ("\t", ","),
-    ("|", "."),
-    ("|", ","),
-    (" ", "."),
-    (" ", ","),
-    (",", ","),
-)
+DIALECTS = (",.", ";.", ";,", "\t.", "\t,", "|.", "|,", " .", " ,", ",,")
+"""Separator and decimal sign, those that are preferred first."""
 WINDOW = 6
 """Lines of which all but one are samples where the samples begin; a preamble may hold a line or two like them."""
 MANY_SHORT = 0.02
@@ -86,19 +76,19 @@ def find_layout(path: Path, lines: Sequence[str], stated: Mapping[str, str]) -> 
     Raises:
         RecordingError: what is stated is not known, or the text can be read in two ways.
     """
-    tried = [_judged(lines, *dialect, stated.get("header", "")) for dialect in _dialects(stated)]
+    tried = [_judged(lines, one[0], one[1], stated.get("header", "")) for one in _dialects(stated)]
     score, layout = max(tried, key=lambda one: one[0])
     if layout and not layout.names and layout.separator == "," and "header" not in stated:
         _check_decimal_commas(path, lines, layout)
     return layout if score else None
 
 
-def _dialects(stated: Mapping[str, str]) -> list[tuple[str, str]]:
+def _dialects(stated: Mapping[str, str]) -> list[str]:
     """Return the pairs of separator and decimal sign that are left by what was stated."""
     separator = _named(stated, "separator", SEPARATORS)
     decimal = _named(stated, "decimal", DECIMALS)
     left = [one for one in DIALECTS if separator in ("", one[0]) and decimal in ("", one[1])]
-    return left or [(separator, decimal)]
+    return left or [separator + decimal]
 
 
 def _named(stated: Mapping[str, str], key: str, choices: Mapping[str, str]) -> str:

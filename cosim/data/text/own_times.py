@@ -4,10 +4,14 @@
     tau; q; t_tau; t_q                          in any order, by their names
 
 A column of time begins a group, which may end before the others do. Where all of them are alike, they are one time.
+
+Elsewhere a channel has the time in its own group (`torque/time` of `torque/value`, `tau.time` of `tau`), or the one
+that is named after it (`t_tau` of `tau`, `time_torque` of `torque`), or the only one of its length, in this order.
+Where none of these tells one, it has no time.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,15 +19,16 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.assign import units_stated
-from cosim.data.clocks import owners
 from cosim.data.columns import Columns
 from cosim.data.roles import is_named
+from cosim.data.text.names import SECONDS, words_of
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError, UndecidedError
-from cosim.support.units import unit
 
 NUMBER = re.compile(r"\s*\(#\d+\)$")
 """What tells apart columns of one name."""
+GROUPS = re.compile(r"(.*)[./]([^./]+)")
+"""A name behind that of its group."""
 AXES = ("x", "x_value", "channel name", "relative time")
 """Names that tools give to the times of a channel, in small letters; any other name says that it is a time."""
 
@@ -99,4 +104,40 @@ def seconds(path: Path, found: Columns, name: str) -> np.ndarray:
     if clock.values.dtype == object:
         text = f'{path}: column "{name}" holds no times: {str(column[0])[:40]!r}.'
         raise RecordingError(text, culprit=str(path), value=name)
-    return np.asarray(clock.values * (unit(clock.unit).factor if clock.unit else 1.0), dtype=np.float64)
+    return clock.seconds
+
+
+def owners(channels: Iterable[str], times: Sequence[str], lengths: Mapping[str, int]) -> dict[str, str]:
+    """Return which of the vectors of time belongs to each channel; one that has none is missing.
+
+    Args:
+        channels: names of channels.
+        times: names of vectors of time.
+        lengths: how long each is.
+    """
+    groups = {time: grouped(time)[0] for time in times}
+    named = {time: _named_after(time) for time in times}
+    owned: dict[str, str] = {}
+    for name in channels:
+        group, words = grouped(name)[0], set(words_of(name))
+        fitting = [time for time in times if lengths[time] == lengths[name]]
+        ways = (
+            [time for time in fitting if groups[time] and groups[time] in (group, name)],
+            [time for time in fitting if named[time] and named[time] <= words],
+            fitting,
+        )
+        owner = next((way[0] for way in ways if len(way) == 1), None)
+        owned |= {name: owner} if owner else {}
+    return owned
+
+
+def grouped(name: str) -> tuple[str, str]:
+    """Return the group of a channel, empty where it has none, and its name in it."""
+    found = GROUPS.fullmatch(name)
+    return (found[1], found[2]) if found else ("", name)
+
+
+def _named_after(time: str) -> set[str]:
+    """Return the words in the name of a time that are none of a time: those of its channel."""
+    words = words_of(grouped(time)[1])
+    return {word for word in words if word not in SECONDS and not is_named(word, "time")}

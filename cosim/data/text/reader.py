@@ -1,6 +1,6 @@
 """Any text to columns: an export that is recognised, or a plain table whose layout is found out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +12,11 @@ from cosim.data.text import json_records, transposed
 from cosim.data.text.cells import with_quotes, without_units
 from cosim.data.text.cleaning import without_brackets, without_remarks
 from cosim.data.text.encoding import text_of
-from cosim.data.text.importers import importer_of
 from cosim.data.text.layout import find_layout
 from cosim.data.text.table import table_of
 from cosim.data.text.vocabulary import with_vocabulary
 from cosim.support.errors import RecordingError
+from cosim.support.plugins import IMPORTERS, loaded, names
 
 LEAST = 10
 """Lines of one number each that are a column; fewer are a preamble or a setting."""
@@ -41,8 +41,7 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
         return turned
     _check_first_line(path, data)
     lines = head_of(data)
-    importer = importer_of(lines) if not stated else None
-    if importer:
+    if not stated and (importer := _importer_of(lines)):
         return importer(path, data, lines)
     data = without_brackets(without_remarks(data), lines)
     data = with_quotes(data, lines)
@@ -54,6 +53,16 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
     layout = replace(layout, labels=units) if len(units) == layout.count else layout
     told = f"{layout}{'' if encoding == 'utf-8' else f', {encoding}'}"
     return with_vocabulary(replace(table_of(path, data, layout), layout=told))
+
+
+def _importer_of(lines: Sequence[str]) -> Callable[[Path, bytes, Sequence[str]], Columns] | None:
+    """Return what is plugged in for a text that begins with these lines; None for a plain table.
+
+    Raises:
+        PlugInError: one cannot be loaded; its texts would be read as tables of something else.
+    """
+    plugged = (loaded(IMPORTERS, name) for name in names(IMPORTERS))
+    return next((one.read for one in plugged if one.recognises(lines)), None)
 
 
 def head_of(data: bytes) -> list[str]:
