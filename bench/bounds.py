@@ -30,7 +30,8 @@ from cosim.diagnosis.effects.candidates import columns_of, span_of
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import SeenFrom, bounds
 from cosim.diagnosis.measure.concealment import Member, members
-from cosim.diagnosis.search.stages import admission, is_small, least, refitted
+from cosim.diagnosis.search.candidate_fit import is_small
+from cosim.diagnosis.search.stages import admission, least, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare

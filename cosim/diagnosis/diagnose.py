@@ -33,15 +33,14 @@ from cosim.diagnosis.measure.protocol import (
 )
 from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import measured, without_names
-from cosim.diagnosis.search.bookkeeping import enter_answer, finished
+from cosim.diagnosis.search.admissibility import standard_errors
+from cosim.diagnosis.search.candidate_fit import by_each_name, is_renamed
 from cosim.diagnosis.search.delivered import detected, likelier, standing, structure_with
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof, prove_sets
-from cosim.diagnosis.search.renaming import by_each_name, is_renamed
 from cosim.diagnosis.search.rivals import Examined, searched_and_examined
-from cosim.diagnosis.search.scores import scores_of, shaken_everywhere
-from cosim.diagnosis.search.sizes import standard_errors
+from cosim.diagnosis.search.scores import enter_answer, finished, scores_of, shaken_everywhere
 from cosim.diagnosis.search.stages import InTurn
 from cosim.diagnosis.terms.closed_form import ClosedForm, searches
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn

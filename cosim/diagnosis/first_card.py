@@ -21,7 +21,7 @@ from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
-from cosim.diagnosis.search.sizes import standard_errors
+from cosim.diagnosis.search.admissibility import standard_errors
 from cosim.diagnosis.trust.balance import Balance
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit, fit

@@ -17,7 +17,7 @@ from cosim.diagnosis.effects.candidates import columns_of
 from cosim.diagnosis.evidence.bands import Bands
 from cosim.diagnosis.evidence.comparison import NONE
 from cosim.diagnosis.evidence.discrepancy import discrepancy
-from cosim.diagnosis.search.sizes import standard_errors, tells
+from cosim.diagnosis.search.admissibility import standard_errors, tells
 from cosim.diagnosis.search.stages import is_full, with_harmonics
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import Prepared, prepare

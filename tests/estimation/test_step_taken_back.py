@@ -13,7 +13,8 @@ from wandering import posed, recorded, swing
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.search.stages import margin, stage
+from cosim.diagnosis.search.candidate_fit import margin
+from cosim.diagnosis.search.stages import stage
 from cosim.estimation import fit as fitting
 from cosim.estimation import problem as problems
 from cosim.estimation import tape_cache

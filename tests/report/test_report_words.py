@@ -16,7 +16,7 @@ from cosim.delivery.deliver import as_json, without_files
 from cosim.diagnosis.answer.result import Finding, Where
 from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.findings import advice, visible_from
-from cosim.diagnosis.search.sizes import Numbers
+from cosim.diagnosis.search.admissibility import Numbers
 from cosim.plots.quantities import FAMILIES, Scale, minus, number, spelled
 from cosim.report import render, tables, words
 from cosim.report.figures_proof import relative

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.search.stages import CandidateFit
+from cosim.diagnosis.search.candidate_fit import CandidateFit
 
 
 @dataclass(frozen=True)

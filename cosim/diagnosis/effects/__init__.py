@@ -46,12 +46,6 @@ def named(effect: str) -> Hypothesis[Any]:
     return _NAMED.get(effect.partition(":")[0], _NONE)
 
 
-def namesakes(effect: Effect, mount: Mount) -> list[Effect]:
-    """The same effect by each other name that it may have on such an axis."""
-    others = (one.renamed(effect, mount) for one in HYPOTHESES if one.same_as == effect.id)
-    return [one for one in others if one is not None]
-
-
 def candidates(
     mount: Mount, prepared: Prepared, residual: Array, level: Array, only: Collection[str] = TRIED
 ) -> list[Candidate]:

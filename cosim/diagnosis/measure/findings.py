@@ -19,10 +19,9 @@ from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.broadband import Shaken
 from cosim.diagnosis.measure.locate import where
-from cosim.diagnosis.search.renaming import is_renamed
+from cosim.diagnosis.search.admissibility import Numbers, numbers_of
+from cosim.diagnosis.search.candidate_fit import CandidateFit, is_renamed
 from cosim.diagnosis.search.rivals import AcceptedEffect
-from cosim.diagnosis.search.sizes import Numbers, numbers_of
-from cosim.diagnosis.search.stages import CandidateFit
 from cosim.estimation.prepare import Array
 from cosim.support.statistics import Z95, rms
 from pyfmi_models.effects import CATALOGUE, Effect

@@ -16,8 +16,7 @@ from scipy.special import fdtrc
 
 from cosim.diagnosis.answer.entries import BiasEntry
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.search.commanded import BLOCK_SECONDS
-from cosim.diagnosis.search.instrumental_variable import on_set_point
+from cosim.diagnosis.search.instrumental_variable import BLOCK_SECONDS, on_set_point
 from cosim.estimation.blocks import Blocks, sandwich
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked

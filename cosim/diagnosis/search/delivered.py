@@ -10,10 +10,10 @@ from cosim.diagnosis.decide.decision import Decision
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.tuning import ended_sizes
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.admissibility import tells
+from cosim.diagnosis.search.candidate_fit import weighed
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.rivals import AcceptedEffect
-from cosim.diagnosis.search.sizes import tells
-from cosim.diagnosis.search.stages import weighed
 from cosim.estimation.fit import Fit, recorded_by, with_values
 from cosim.estimation.problem import LESS
 

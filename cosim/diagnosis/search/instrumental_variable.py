@@ -1,4 +1,4 @@
-"""Lag or delay? Asked of the part of the signals that follows the set point, which no noise can imitate.
+"""Lag or delay, spring or the loop's answer to noise? Asked of what follows the set point: no noise can imitate that.
 
 In closed loop the controller answers encoder noise and disturbances, so recorded torque and recorded motion are related
 by the controller as well as by the machine, and least squares mistakes the one for the other: gain and phase of a drive
@@ -8,21 +8,35 @@ point would need, the cross-spectra
     S_z,tau = D^-1(w) S_z,needed,      D = 1 / (1 + j w T)  or  exp(-j w T)
 
 hold whatever the noise is: z is an instrument. Base parameters and the shapes that friction laws cannot agree on stay
-free. Reference: Soderstrom and Stoica, Instrumental Variable Methods for System Identification, 1983, chapter 5.
+free.
+
+Where a motion asks nothing of the upper band, torque and acceleration there are noise and the controller's answer to
+it. Least squares takes that answer for mechanics: an inertia that is less where the loop is slow is a spring. With x
+what the effect adds along the measured motion, z the same along the set point, and r what the structure leaves, all
+free of the base's tangents and of what friction laws lack,
+
+    share = 1 + z'r / z'x
+
+is how much of the effect the set point asks for: 1 of a real one, 0 of the loop's answer.
+Reference: Soderstrom and Stoica, Instrumental Variable Methods for System Identification, 1983, chapter 5.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.delay_and_lag import Drive, milliseconds, timed
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.candidate_fit import CandidateFit
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.discrepancy_basis import speed_shapes, stop_distances, stop_operators
 from cosim.estimation.filters import derivative
-from cosim.estimation.fit import free_parameters
-from cosim.estimation.inverse import Inverse
+from cosim.estimation.fit import Fit, free_parameters
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.tonal_disturbance import without_tones
 from cosim.support.statistics import SURELY, hann
@@ -50,23 +64,8 @@ SHAPE_PRIOR = 0.3
 """A friction shape may have about this share of the torque's RMS."""
 GRID = np.geomspace(0.3, 3.0, 13)
 """Time constants and dead times that are looked at, relative to the fitted one."""
-
-
-class Explains(Protocol):
-    """An effect on trial, and the share of the plain residual energy that it removes."""
-
-    @property
-    def effect(self) -> Effect:
-        """The effect."""
-        ...
-
-    @property
-    def plain_gain(self) -> float:
-        """The share."""
-        ...
-
-
-One = TypeVar("One", bound=Explains)
+BLOCK_SECONDS = 2.0
+"""Longer than the residual remembers, short enough for many."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def excludes(misfits: Misfits, effect: Effect, rival: Effect) -> float | None:
     return misfits[rival.id] - misfits[effect.id]
 
 
-def settled(misfits: Misfits, best: One, rivals: Sequence[One]) -> One:
+def settled(misfits: Misfits, best: CandidateFit, rivals: Sequence[CandidateFit]) -> CandidateFit:
     """The rival that the set point demands in place of the best, else the best."""
     for rival in rivals:
         margin = excludes(misfits, best.effect, rival.effect)
@@ -94,7 +93,7 @@ def settled(misfits: Misfits, best: One, rivals: Sequence[One]) -> One:
     return best
 
 
-def is_told(misfits: Misfits, one: Explains) -> bool:
+def is_told(misfits: Misfits, one: CandidateFit) -> bool:
     """Whether what follows the set point is late at all: noise that the controller answers looks late by itself.
 
     Being late must explain most of what the set point sees of a model without it: friction that meets a noisy speed is
@@ -115,7 +114,7 @@ def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
     """
     if type(drive) not in TWINS or not isinstance(drive, DriveEffect):
         return {}
-    mount = replace(fitted, effects=tuple(effect for effect in fitted.effects if effect is not drive))
+    mount = _without(fitted, drive)
     if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
         return {}
     parts = [part for part in (_crossed(mount, piece, prepared) for piece in prepared.pieces) if part is not None]
@@ -193,3 +192,39 @@ def _noise(residual: Complex) -> Array:
     power = (np.abs(residual) ** 2).sum(0)
     kernel = np.ones(SMOOTH) / SMOOTH
     return np.asarray(np.sqrt(np.convolve(np.pad(power, SMOOTH // 2, mode="edge"), kernel, "valid") + 1e-300))
+
+
+def is_asked_for(comparison: Comparison, found: Fit, effect: Effect) -> bool:
+    """Whether the set point asks for a fitted effect; true where no set point was recorded."""
+    prepared, problem = comparison.problem.prepared, comparison.problem
+    if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
+        return True
+    weight = problem.weight
+    along = weight * _added(found, effect, prepared.pieces)
+    asked = weight * _added(found, effect, tuple(map(on_set_point, prepared.pieces)))
+    own = [k for k, name in enumerate(found.free) if not name.startswith(f"{effect.id}.")]
+    known = np.column_stack([found.slopes[:, own], comparison.nuisances.columns]) * weight[:, None]
+    x, z, r = projected(np.column_stack([along, asked, weight * found.residual]), known).T
+    share, error = _share(x, z, r, Blocks.of(prepared, BLOCK_SECONDS))
+    return share >= POLICY.half and share > SURELY * error
+
+
+def _share(x: Array, z: Array, r: Array, blocks: Blocks) -> tuple[float, float]:
+    """How much of x the instrument z asks for where r is left of it, and its standard error over blocks."""
+    common = float(z @ x)
+    if common == 0.0:
+        return 0.0, 0.0
+    share = 1 + float(z @ r) / common
+    left = r + (1 - share) * x
+    return share, float(np.sqrt(sum(float(z[rows] @ left[rows]) ** 2 for rows in blocks.rows))) / abs(common)
+
+
+def _added(found: Fit, effect: Effect, pieces: Sequence[Piece]) -> Array:
+    """Torque [N m] that an effect adds to what a motion needs, at the kept rows."""
+    mounts = found.mount, _without(found.mount, effect)
+    whole, without = (stacked(Inverse(one, ()), pieces, np.zeros(0))[0] for one in mounts)
+    return np.asarray(whole - without)
+
+
+def _without(mount: Mount, effect: Effect) -> Mount:
+    return replace(mount, effects=tuple(one for one in mount.effects if one is not effect))

@@ -28,9 +28,9 @@ from cosim.diagnosis.answer.ledger import Rule
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.search.proof import Proof, gained, without
+from cosim.diagnosis.search.admissibility import goes_its_way
+from cosim.diagnosis.search.proof import Proof, Validation, gained
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
-from cosim.diagnosis.search.sizes import goes_its_way
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.terms.dictionary import OF_LAW
 from cosim.diagnosis.terms.grams import Grams, columns_of, grams_of
@@ -86,7 +86,8 @@ class _Offered:
 def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
     """Take away the names that something without a name explains far better, the worst first."""
     offered, least = _Offered.by(comparison, held), comparison.policy.clear
-    found = _without_misnamed(comparison, examined, Nameless(proof), held, offered)
+    validation = Validation(comparison, examined, held)
+    found = _without_misnamed(validation, Nameless(proof), offered)
     while found.proof.standing:
         known = [*offered.law, *found.terms]
         own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
@@ -104,24 +105,22 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
             return replace(found, ahead={one.name: -lead for one, lead in met if not hypothesis_of(one).is_fine})
         left, gone = found.proof, {one.effect.name for one in worst.effects}
         while out := [one for one in left.standing if one.effect.name in gone]:
-            left = without(comparison, examined, left, out[0], held)
+            left = validation.without(left, out[0])
         found = Nameless(left, (*found.taken, *((one, worst.term) for one in worst.effects)))
     return found
 
 
-def _without_misnamed(
-    comparison: Comparison, examined: Examined, found: Nameless, held: Predictive, offered: _Offered
-) -> Nameless:
+def _without_misnamed(validation: Validation, found: Nameless, offered: _Offered) -> Nameless:
     """Take away names whose numbers do not surely go the way that the name says: something is there, and is not it."""
+    comparison, chosen = validation.comparison, found.proof.chosen
     for one in found.proof.standing:
-        chosen = found.proof.chosen
         goes = goes_its_way(comparison.problem, chosen, one.within(chosen.mount))
         comparison.judge(one.effect.name, chosen, [Rule("its numbers surely have the sign of such an effect", goes)])
         if not goes and offered.free:
-            grams = _grams(comparison, comparison.problem.without(found.proof.chosen, one.effect.name), offered.free)
+            grams = _grams(comparison, comparison.problem.without(chosen, one.effect.name), offered.free)
             term = offered.free[max(range(len(offered.free)), key=lambda k: _worth(grams, [k]))]
-            left = without(comparison, examined, found.proof, one, held)
-            return _without_misnamed(comparison, examined, Nameless(left, (*found.taken, (one, term))), held, offered)
+            left = Nameless(validation.without(found.proof, one), (*found.taken, (one, term)))
+            return _without_misnamed(validation, left, offered)
     return found
 
 
@@ -193,5 +192,5 @@ def _held(comparison: Comparison, found: Nameless, one: _Challenge, held: Predic
     likelihood = held.likelihood_of(whole)
     lead = likelihood - held.likelihood_of(with_name)
     gains = likelihood - held.likelihood_of(one.beside.mount) >= policy.fair
-    holds = gains and lead >= -policy.clear and not gained(lead, with_name, whole, held).raises(policy)
+    holds = gains and lead >= -policy.clear and not gained(held, lead, with_name, whole).raises(policy)
     return holds, one.lead + (max(lead, 0.0) * are_two if holds else min(lead, 0.0))

@@ -8,24 +8,19 @@ from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.base import Cyclic
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.candidate_fit import CandidateFit, contest, is_small, margin, renamed, weighed
 from cosim.diagnosis.search.instrumental_variable import Misfits, excludes, misfits_of, settled
-from cosim.diagnosis.search.renaming import renamed
 from cosim.diagnosis.search.stages import (
     IN_TURN,
-    CandidateFit,
     InTurn,
     Search,
     Stage,
     admission,
     at_its_end,
     best_of,
-    contest,
     is_full,
-    is_small,
-    margin,
     search,
     stage,
-    weighed,
 )
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect

@@ -10,7 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.search.stages import CandidateFit, InTurn, OnProgress, Start, refitted
+from cosim.diagnosis.search.candidate_fit import CandidateFit
+from cosim.diagnosis.search.stages import InTurn, OnProgress, Start, refitted
 from cosim.estimation.fit import Fit
 from cosim.support.cell import Cell, LostError, cores
 from pyfmi_models.effects.base import Coupling

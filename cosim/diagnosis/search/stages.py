@@ -6,7 +6,6 @@ plain energy - and the best forms by either are refitted. Nothing is dropped bec
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import inf, log
 
 from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.decide.policy import Policy
@@ -15,11 +14,9 @@ from cosim.diagnosis.effects.candidates import columns_of
 from cosim.diagnosis.effects.tuning import in_whole_cycles
 from cosim.diagnosis.evidence.comparison import Comparison, Screened, aside_for
 from cosim.diagnosis.search.admissibility import in_time, name_rules
-from cosim.diagnosis.search.base_moved import owed_to_base
-from cosim.diagnosis.search.commanded import is_asked_for
-from cosim.diagnosis.search.instrumental_variable import is_told, misfits_of, settled
+from cosim.diagnosis.search.candidate_fit import CandidateFit, is_small, margin, weighed
+from cosim.diagnosis.search.instrumental_variable import is_asked_for, is_told, misfits_of, settled
 from cosim.estimation.fit import Fit
-from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
 from pyfmi_models.effects import Effect
 
 OnProgress = Callable[[str], None]
@@ -27,33 +24,6 @@ MULTIPLES = (2, 3, 4, 5)
 """Multiples of the cycles of a ripple that are asked for at once: slots and rollers are no sines."""
 MOST_WAVES = 8
 """Effects that one diagnosis may add, each harmonic of a ripple counted."""
-
-
-@dataclass(frozen=True)
-class CandidateFit:
-    """A structure with one effect more, refitted, and what the effect is worth."""
-
-    effect: Effect
-    fit: Fit
-    evidence: float
-    """Nats above the structure without the effect, search priced."""
-    price: float
-    """Nats that are not its own: what the search among the members of its form costs, and what is owed to other numbers
-    of the base; taken off already."""
-    plain_gain: float
-    """Share of the plain residual energy removed."""
-    price_of_forms: float = 0.0
-    """The price in a contest of names, which counts few ways of being wrong."""
-    above_noise: float = inf
-    """Energy that a spring removes, in those of the reading's noise."""
-    away: float = 1.0
-    """Share of the energy that a timing effect removes which it removes away from turns."""
-    at_rest: float = 1.0
-    """Share of the energy at rest that a contact that bends removes."""
-    many: int = 1
-    """How many members of its form were tried."""
-    is_rough: bool = False
-    """Whether its fit ended where it is clear which of many is best (`Problem.roughly`)."""
 
 
 @dataclass(frozen=True)
@@ -174,26 +144,6 @@ def at_its_end(comparison: Comparison, one: CandidateFit, current: Fit) -> Candi
     return weighed(comparison, comparison.problem.fit(one.fit.mount, 36), current, one.many)
 
 
-def weighed(
-    comparison: Comparison, found: Fit, current: Fit, many: int = 1, effect: Effect | None = None
-) -> CandidateFit:
-    """What an effect of a fitted structure (the last one) is worth beside the structure without it."""
-    effect = effect or found.mount.effects[-1]
-    aside = aside_for(effect.id)
-    owed, owed_by_forms = owed_to_base(comparison, found, current, aside)
-    price, price_of_forms = log(max(many, 1)) + owed, log(max(many, 1)) + owed_by_forms
-    with_it, without = (comparison.evidence(one, aside, beside=current) for one in (found, current))
-    gain = with_it - without - price
-    own, problem = hypothesis_of(effect), comparison.problem
-    loud = comparison.above_noise(found, current) if own.must_stand_out else inf
-    left, before = (problem.weight * one.residual for one in (found, current))
-    away = away_from_turns(problem, left, before) if own.is_timing else 1.0
-    share = 1 - float(left @ left) / max(float(before @ before), 1e-300)
-    remembers = gets_memory(found.mount, current.mount)
-    rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
-    return CandidateFit(effect, found, gain, price, share, price_of_forms, loud, away, rest, many)
-
-
 @dataclass(frozen=True)
 class Search:
     """Structures in the order in which effects were added, and the stage beside each."""
@@ -300,36 +250,6 @@ def first_of(comparison: Comparison, several: Sequence[CandidateFit]) -> Candida
         if aside_for(best.effect.id) != aside_for(rival.effect.id) and margin(comparison, best, rival) < 0:
             best = rival
     return best
-
-
-def margin(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> float:
-    """Nats by which one structure is better than another; nuisances that either effect is stand aside for both."""
-    aside = aside_for(one.effect.id, other.effect.id)
-    return comparison.evidence(one.fit, aside) - one.price - comparison.evidence(other.fit, aside) + other.price
-
-
-def contest(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> float:
-    """Nats by which one name beats another, where neither equation is quite the machine's.
-
-        D = L(one) - L(other),    margin = sign(D) min(|D|, max(sign(D) D_K, 0))
-
-    D_K is D with K independent ways of each band in which an equation is wrong (`Policy.form_ways`): what an equation
-    misses is the same in every stroke, so rows say again and again what they said in the first one.
-
-    Reference: coarsened posterior, Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113.
-    """
-    aside = aside_for(one.effect.id, other.effect.id)
-    rows, forms = (
-        comparison.evidence(one.fit, aside, few) - comparison.evidence(other.fit, aside, few) - price
-        for few, price in ((False, one.price - other.price), (True, one.price_of_forms - other.price_of_forms))
-    )
-    way = 1.0 if rows >= 0 else -1.0
-    return way * min(abs(rows), max(way * forms, 0.0))
-
-
-def is_small(one: CandidateFit, policy: Policy) -> bool:
-    """Whether an effect explains little, and not surely."""
-    return one.plain_gain < policy.small and one.evidence < policy.sure
 
 
 def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.search.base_moved import FAR
+from cosim.diagnosis.search.candidate_fit import FAR
 from cosim.diagnosis.trust.balance import Balance, Estimate
 from cosim.estimation.determined import ended_at
 from cosim.estimation.prepare import Array

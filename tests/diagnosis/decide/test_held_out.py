@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -26,10 +26,11 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.protocol import of_the_best
 from cosim.diagnosis.search import rivals
+from cosim.diagnosis.search.candidate_fit import CandidateFit, weighed
 from cosim.diagnosis.search.nameless import Nameless, _Challenge, _challenge, _held, _Offered, nameless
-from cosim.diagnosis.search.proof import _validation
+from cosim.diagnosis.search.proof import Validation
 from cosim.diagnosis.search.rivals import AcceptedEffect, examine, explains, margins
-from cosim.diagnosis.search.stages import CandidateFit, Search, Stage, weighed
+from cosim.diagnosis.search.stages import Search, Stage
 from cosim.diagnosis.terms.candidate_terms import candidate_terms
 from cosim.diagnosis.terms.learn import allowed
 from cosim.estimation.fit import Fit
@@ -139,7 +140,8 @@ def test_a_spring_that_is_refitted_to_spring_no_more_falls(damping, stands, monk
     one = accepted(spring(0.1))
     comparison: Any = SimpleNamespace(problem=problem, policy=POLICY)
     examined: Any = SimpleNamespace(effects=(one,), base=left(1.0))
-    assert all_pass(_validation(comparison, examined, left(0.1, spring(damping)), one, SURE)) is stands
+    validation = Validation(comparison, examined, cast(Any, None))
+    assert all_pass(validation.rules(left(0.1, spring(damping)), one, SURE)) is stands
 
 
 def test_of_a_ripple_the_strongest_wave_is_looked_at_and_none_of_the_cards_own() -> None:

@@ -18,8 +18,7 @@ from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
-from cosim.diagnosis.search.admissibility import is_degenerate
-from cosim.diagnosis.search.sizes import Numbers
+from cosim.diagnosis.search.admissibility import Numbers, is_degenerate
 from cosim.diagnosis.search.stages import refitted
 from cosim.estimation.prepare import prepare
 from pyfmi_models.card import Card, parse_card

@@ -23,8 +23,9 @@ from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.clock_skew import Clocks
 from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
 from cosim.diagnosis.search.admissibility import is_degenerate
+from cosim.diagnosis.search.candidate_fit import margin
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
-from cosim.diagnosis.search.stages import admission, margin, refitted
+from cosim.diagnosis.search.stages import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare

@@ -18,7 +18,7 @@ from cosim.diagnosis.evidence.discrepancy import WAVES, Discrepancy, discrepancy
 from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.evidence.structure import Structure
-from cosim.diagnosis.search.stages import weighed
+from cosim.diagnosis.search.candidate_fit import weighed
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import FrictionAsymmetry

@@ -19,8 +19,9 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search import admissibility
 from cosim.diagnosis.search.admissibility import in_time, is_degenerate, name_rules, needs_turns
-from cosim.diagnosis.search.commanded import is_asked_for
-from cosim.diagnosis.search.stages import admission, refitted, weighed
+from cosim.diagnosis.search.candidate_fit import weighed
+from cosim.diagnosis.search.instrumental_variable import is_asked_for
+from cosim.diagnosis.search.stages import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

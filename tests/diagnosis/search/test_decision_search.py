@@ -12,9 +12,10 @@ from named_structures import Fitted, Named, Structure, Tables, candidate, fitted
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search import proof as proofs
 from cosim.diagnosis.search import rivals
+from cosim.diagnosis.search.candidate_fit import CandidateFit
 from cosim.diagnosis.search.proof import Proof, prove_sets
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
-from cosim.diagnosis.search.stages import CandidateFit, Stage
+from cosim.diagnosis.search.stages import Stage
 from pyfmi_models.effects import Cogging
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction

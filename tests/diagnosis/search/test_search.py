@@ -22,24 +22,11 @@ from cosim.diagnosis.evidence import comparison as evidence
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.search import side_by_side
-from cosim.diagnosis.search.base_moved import owed_to_base
+from cosim.diagnosis.search.candidate_fit import CandidateFit, contest, is_small, owed_to_base, weighed
 from cosim.diagnosis.search.global_test import Scores, _groups, global_test
 from cosim.diagnosis.search.rivals import refitted_from_here
 from cosim.diagnosis.search.side_by_side import SideBySide
-from cosim.diagnosis.search.stages import (
-    CandidateFit,
-    InTurn,
-    best_of,
-    contest,
-    holds_at_rest,
-    is_small,
-    least,
-    refitted,
-    search,
-    stage,
-    starts,
-    weighed,
-)
+from cosim.diagnosis.search.stages import InTurn, best_of, holds_at_rest, least, refitted, search, stage, starts
 from cosim.estimation.fit import Fit, with_values
 from cosim.support.cell import Cell
 from cosim_studies.proof.generator import make_case, write_case

@@ -17,9 +17,17 @@ from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.tuning import ANY, at_bound
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import not_found
-from cosim.diagnosis.search.admissibility import in_time, is_degenerate, needs_turns
-from cosim.diagnosis.search.sizes import Numbers, is_told, numbers_of, standard_errors
-from cosim.diagnosis.search.stages import CandidateFit, margin, refitted
+from cosim.diagnosis.search.admissibility import (
+    Numbers,
+    in_time,
+    is_degenerate,
+    is_told,
+    needs_turns,
+    numbers_of,
+    standard_errors,
+)
+from cosim.diagnosis.search.candidate_fit import CandidateFit, margin
+from cosim.diagnosis.search.stages import refitted
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare

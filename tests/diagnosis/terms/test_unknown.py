@@ -21,7 +21,7 @@ from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_lef
 from cosim.diagnosis.evidence.broadband import shaken
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.flagged import Residual, flagged, loud_states, noise_at
-from cosim.diagnosis.terms.flexible import flexible_terms
+from cosim.diagnosis.search.scores import flexible_terms
 from cosim.estimation.discrepancy_basis import last_reversal
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
