@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells, short
+from cosim.data.limits import check_cells, several, short
+from cosim.data.long_form import by_signal
 
 READING = re.compile(
     r"(?P<name>\S+)\s+(?P<date>\d{4}-\d\d-\d\d)\s+(?P<time>\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(?P<value>\S+)(?P<alarm>.*)"
@@ -44,13 +45,9 @@ def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
     seconds = (stamps - stamps.min()).astype(np.int64) * 1e-9
     values = np.array([float(one["value"]) if "INVALID" not in one["alarm"] else np.nan for one in good])
     names = np.array([one["name"] for one in good], dtype=object)
-    channels, clocks = {}, {}
-    for name in dict.fromkeys(names.tolist()):
-        rows = np.flatnonzero(names == name)
-        rows = rows[np.argsort(seconds[rows], kind="stable")]
-        channels[name], clocks[name] = values[rows], seconds[rows]
-    many = f"{len(odd):,} lines that are no reading were" if len(odd) > 1 else "one line that is no reading was"
-    notes = (f"{path.stem}: {many} left out, such as {short(odd[0])!r}.",) if odd else ()
+    channels, clocks = by_signal(names, seconds, values)
+    said = several(len(odd), "line that is no reading was", "lines that are no reading were")
+    notes = (f"{path.stem}: {said} left out, such as {short(odd[0])!r}.",) if odd else ()
     return Columns(
         channels, format="EPICS camonitor", start=str(stamps.min().astype("datetime64[ms]")), notes=notes, clocks=clocks
     )

@@ -4,14 +4,13 @@ A file is read from itself alone: links and datasets that lead to other files ar
 than it holds (`hdf5_chunks`).
 """
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.channels import is_table, left_out, vectors, with_clocks
+from cosim.data.binary.channels import columns_of_arrays, is_table
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns, check_time, short
 from cosim.support.errors import RecordingError
@@ -34,16 +33,10 @@ def read(path: Path) -> Columns:
         arrays = {name: _values(path, item) for name, item in items.items()}
         stated = {name: text for name, item in items.items() if (text := _unit(item))}
         objects = any(name.startswith(INTERNAL) for name in file)
-    if channels := with_clocks(path, arrays, stated):
-        return channels
-    often = Counter(name.split("/")[-1] for name in arrays)
-    names = {whole: whole.split("/")[-1] if often[whole.split("/")[-1]] == 1 else whole for whole in arrays}
-    found = {names[whole]: array for whole, array in arrays.items()}
-    values = vectors(path, found)
-    if objects and not values:
+    columns = columns_of_arrays(path, arrays, stated, "/")
+    if objects and not columns.values:
         raise opaque(path)
-    units = {names[whole]: text for whole, text in stated.items() if names[whole] in values}
-    return Columns(values, units, notes=left_out(path, found, values))
+    return columns
 
 
 def opaque(path: Path) -> RecordingError:

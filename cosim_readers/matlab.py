@@ -11,7 +11,7 @@ from math import prod
 from pathlib import Path
 from typing import IO
 
-from cosim.data.binary.channels import left_out, vectors, with_clocks
+from cosim.data.binary.channels import columns_of_arrays
 from cosim.data.columns import Columns
 from cosim.data.limits import allowance, check_cells, check_time, check_unpacked, listed
 from cosim_readers import hdf5
@@ -42,14 +42,10 @@ def read(path: Path) -> Columns:
         found = arrays_of(loadmat(path, squeeze_me=True, simplify_cells=True))
     objects = f"{path.stem}: objects that only MATLAB can open were left out: {listed(tuple(found.objects))}."
     notes = (objects,) if found.objects else ()
-    if channels := with_clocks(path, found.arrays, found.units):
-        return replace(channels, notes=notes + channels.notes)
-    found = found.named()
-    values = vectors(path, found.arrays)
-    if found.objects and not values:
+    columns = columns_of_arrays(path, found.arrays, found.units, ".")
+    if found.objects and not columns.values:
         raise hdf5.opaque(path)
-    units = {name: text for name, text in found.units.items() if name in values}
-    return Columns(values, units, notes=notes + left_out(path, found.arrays, values))
+    return replace(columns, notes=notes + columns.notes)
 
 
 def _check_packed(path: Path) -> None:

@@ -5,7 +5,6 @@ dSPACE: `X` and `Y`, arrays of structs with `Name`, `Data` and `Unit`. Of other 
 their last part where it is unique in the file. Objects of MATLAB (table, timeseries, Dataset) only MATLAB can open.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,13 +22,6 @@ class Found:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     objects: list[str] = field(default_factory=list)
-
-    def named(self) -> "Found":
-        """Return the same with the last part of a path as its name, where no other array has it."""
-        often = Counter(path.rpartition(".")[2] for path in self.arrays)
-        names = {path: path.rpartition(".")[2] if often[path.rpartition(".")[2]] == 1 else path for path in self.arrays}
-        units = {names[path]: text for path, text in self.units.items()}
-        return Found({names[path]: array for path, array in self.arrays.items()}, units, self.objects)
 
 
 def arrays_of(values: Mapping[str, Any]) -> Found:

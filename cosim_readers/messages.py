@@ -22,7 +22,7 @@ import numpy as np
 
 from cosim.data.columns import Columns
 from cosim.data.limits import COLUMNS, NUMBER, allowance, check_cells, check_columns, check_time, listed
-from cosim.data.roles import guess
+from cosim.data.roles import tell_an_axis
 
 JOINTS = ("position", "velocity", "effort")
 NANO = 1e-9
@@ -57,7 +57,7 @@ class Topic:
     @property
     def is_whole(self) -> bool:
         """Whether it tells of torque and of motion."""
-        return all(any(guess(role, self.names, {}).among for role in roles) for roles in (("tau",), ("q", "v")))
+        return tell_an_axis(self.names, {})
 
     def times(self) -> np.ndarray:
         """Times of its messages in ns, shape (rows,)."""

@@ -51,8 +51,8 @@ def assign(request: Request, found: Columns) -> Assigned:
     stated = {ours: numbered(theirs, found) for ours, theirs in request.columns.items()}
     named = {name: units_stated(found, name) for name in found.values}
     values, had = renamed(path, found.values, stated), renamed_units(named, stated)
-    roles = _missing(path, found, values, had, [*stated], request.required, request.units)
-    sources = {**{ours: theirs for ours, theirs in stated.items()}, **roles}
+    roles = _missing(request, found, values, had, [*stated])
+    sources = stated | roles
     values = renamed(path, values, roles)
     given = {name: spelled(text) for name, text in request.units.items()}
     had = renamed_units({name: text for name, text in found.units.items() if is_known(text)}, stated | roles)
@@ -109,15 +109,10 @@ def numbered(name: str, found: Columns) -> str:
 
 
 def _missing(
-    path: Path,
-    found: Columns,
-    values: Mapping[str, np.ndarray],
-    units: Mapping[str, str],
-    taken: Sequence[str],
-    required: Sequence[str],
-    given: Mapping[str, str],
+    request: Request, found: Columns, values: Mapping[str, np.ndarray], units: Mapping[str, str], taken: Sequence[str]
 ) -> dict[str, str]:
     """Return the file's names of those of our columns that are missing."""
+    path, required = request.path, request.required
     lacking = [rule for rule in ("t", *required) if not any(name in values for name in rule.split("|"))]
     free = [name for name in values if name not in taken and name not in OURS]
     if lacking and found.numbered and questions.may_serve(found, lacking, free):
@@ -125,16 +120,14 @@ def _missing(
     roles: dict[str, str] = {}
     beside = (OPTIONAL if lacking else ALWAYS) if required else ()
     for rule in [*lacking, *(name for name in beside if name not in values)]:
-        role, name = _one(path, found, rule, [name for name in free if name not in roles.values()], units, given)
+        role, name = _one(request, found, rule, [name for name in free if name not in roles.values()], units)
         roles |= {role: name} if name else {}
     return roles
 
 
-def _one(
-    path: Path, found: Columns, rule: str, free: Sequence[str], units: Mapping[str, str], given: Mapping[str, str]
-) -> tuple[str, str]:
+def _one(request: Request, found: Columns, rule: str, free: Sequence[str], units: Mapping[str, str]) -> tuple[str, str]:
     """Return which of our columns a rule asks for, and the file's name of it; an empty one where there is none."""
-    names = rule.split("|")
+    path, names = request.path, rule.split("|")
     for role in names:
         if found.roles.get(role) in free:
             return role, found.roles[role]
@@ -142,7 +135,7 @@ def _one(
         if role == "t" and len(told.among) > 1:
             growing = tuple(name for name in told.among if questions.grows(found.values[name]))
             told = replace(told, among=growing or told.among)
-        if told.name or (told.current and len(told.among) == 1 and role in given):
+        if told.name or (told.current and len(told.among) == 1 and role in request.units):
             return role, told.among[0]
         if told.among and role not in OPTIONAL:
             raise questions.current(path, told) if told.current else questions.ambiguous(path, found, told)
@@ -154,9 +147,6 @@ def _one(
 def _notes(path: Path, roles: Mapping[str, str], units: Mapping[str, str]) -> tuple[str, ...]:
     if not roles:
         return ()
-    told = [f'{ours} = "{short(theirs)}"{_in(units.get(ours, ""))}' for ours, theirs in roles.items()]
+    scale = {ours: f" in {units[ours]}" if units.get(ours) else "" for ours in roles}
+    told = [f'{ours} = "{short(theirs)}"{scale[ours]}' for ours, theirs in roles.items()]
     return (f"{path.stem}: by the names of its columns, {', '.join(told)}; --columns says it otherwise.",)
-
-
-def _in(text: str) -> str:
-    return f" in {text}" if text else ""

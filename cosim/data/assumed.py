@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.data import questions
+from cosim.data.columns import Array
 from cosim.data.limits import short
 
-Array = npt.NDArray[np.float64]
 SI = {"tau": "N.m or N", "q": "rad or m", "v": "rad/s or m/s"}
 """Units in which columns of ours are taken that state none; a file with our own names is in them by definition."""
 EXAMPLES = {"tau": "mN.m", "q": "deg", "v": "rpm"}

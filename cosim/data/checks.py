@@ -53,9 +53,8 @@ def check_names(path: Path, values: dict[str, np.ndarray], required: tuple[str, 
     for rule in ("t", *required):
         if not any(name in values for name in rule.split("|")):
             first = rule.split("|")[0]
-            message = (
-                f"{path} has no column {rule.replace('|', ' or ')}; it has: {have}. Name it with --columns {first}=..."
-            )
+            lacks = f"{path} has no column {rule.replace('|', ' or ')}; it has: {have}."
+            message = f"{lacks} Name it with --columns {first}=..."
             if rule == "t":
                 raise untimed(path, values, message)
             raise RecordingError(message, culprit=str(path), value=rule, choices=tuple(values))
@@ -89,7 +88,8 @@ def _fault(column: np.ndarray) -> str | None:
         return f'"{short(str(value))}" at row {row + 1:,}, which is not a number'
     bad = np.flatnonzero(~np.isfinite(column))
     if not len(bad):
-        return _beyond(column)
+        large = np.flatnonzero(np.abs(column) > LARGEST)
+        return f"{column[large[0]]:.3g} at row {large[0] + 1:,}, which is beyond any axis" if len(large) else None
     more = f" ({len(bad):,} such rows)" if len(bad) > 1 else ""
     return f"{column[bad[0]]} at row {bad[0] + 1:,}, which is not a finite number{more}"
 
@@ -97,11 +97,6 @@ def _fault(column: np.ndarray) -> str | None:
 def _is_empty_only(column: np.ndarray) -> bool:
     """Whether every sample of a column that is no finite number is none at all."""
     return column.dtype.kind == "f" and bool(np.isnan(column[~np.isfinite(column)]).all())
-
-
-def _beyond(column: np.ndarray) -> str | None:
-    large = np.flatnonzero(np.abs(column) > LARGEST)
-    return f"{column[large[0]]:.3g} at row {large[0] + 1:,}, which is beyond any axis" if len(large) else None
 
 
 def _is_number(value: Any) -> bool:
@@ -160,13 +155,11 @@ def check_sampling(path: Path, t: np.ndarray) -> None:
     steps = np.diff(t)
     dt = float(np.median(steps))
     if dt > SLOWEST:
-        text = (
-            f"{path} is sampled every {dt:.3g} s; an axis is sampled every {SLOWEST:g} s at least. If its time counts "
-        )
-        raise RecordingError(f"{text}another unit than s, say which with --units t=ms.", culprit=str(path), value=dt)
+        rule = f"an axis is sampled every {SLOWEST:g} s at least"
+        way = "If its time counts another unit than s, say which with --units t=ms"
+        raise RecordingError(f"{path} is sampled every {dt:.3g} s; {rule}. {way}.", culprit=str(path), value=dt)
     rows = float(steps[steps <= BRIDGED].sum()) / dt
     if rows > WORTH * len(t):
-        text = (
-            f"{path}: half of its time steps are {dt:.3g} s or less and others {float(steps.max()):.3g} s: that is no "
-        )
-        raise RecordingError(f"{text}sample time. Export it with one sample time.", culprit=str(path), value=dt)
+        said = f"half of its time steps are {dt:.3g} s or less and others {float(steps.max()):.3g} s"
+        text = f"{path}: {said}: that is no sample time. Export it with one sample time."
+        raise RecordingError(text, culprit=str(path), value=dt)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from cosim.support.errors import RecordingError
 from cosim.support.plain import JsonObject
 
+Array = npt.NDArray[np.float64]
 ORIGIN_KEY = b"cosim.origin"
 """Key of a Parquet file's metadata under which the origin stands, as JSON."""
 UNIT_KEY = b"unit"

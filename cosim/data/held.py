@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from cosim.data.columns import Array
+
 Index = npt.NDArray[np.int64]
 READ = ("tau", "q", "v", "q_d")
 """Columns that are judged; any other may change as seldom as it likes."""

@@ -29,14 +29,13 @@ import numpy.typing as npt
 from cosim.data import questions
 from cosim.data.assign import OURS, assign
 from cosim.data.checks import chosen
-from cosim.data.columns import Columns, Request
+from cosim.data.columns import Array, Columns, Request
 from cosim.data.limits import listed, short
 from cosim.data.order import order_of, single
 from cosim.data.registers import register_of
 from cosim.data.roles import is_named
 from cosim.support.errors import RecordingError
 
-Array = npt.NDArray[np.float64]
 GAP = 1.5
 """A step of a channel longer than this many of its own periods is a gap."""
 USUAL = 0.9
@@ -140,11 +139,9 @@ def on_one_time(request: Request, found: Columns) -> Columns:
         _check_times(path, longest)
     channels = {name: one for name, one in channels.items() if one.grows}
     roles = {name: ours for name, ours in roles.items() if name in channels}
-    channels |= {
-        name: _turned(channels[name], served.units.get("q", "")) for name, ours in roles.items() if ours == "q"
-    }
-    base = _base([channels[name] for name in needed], roles) or max(channels.values(), key=lambda one: len(one.t))
-    return _table(path, found, channels, roles, base, needed)
+    for name in (theirs for theirs, ours in roles.items() if ours == "q"):
+        channels[name] = _turned(channels[name], served.units.get("q", ""))
+    return _table(path, found, channels, roles, needed)
 
 
 def _of_one_clock(found: Columns, name: str) -> Columns:
@@ -196,16 +193,16 @@ def _channel(found: Columns, name: str, repeated: str) -> Channel | None:
 
 def _check_times(path: Path, channel: Channel) -> None:
     """Refuse a channel whose time does not grow."""
-    if not channel.grows:
-        row = int(np.flatnonzero(np.diff(channel.t) <= 0)[0])
-        before, after = float(channel.t[row]), float(channel.t[row + 1])
-        how = "stands still and values differ" if after == before else "runs backwards"
-        where = f"at its sample {row + 2:,} ({before:.9g} s to {after:.9g} s)"
-        text = f'{path}: the time of "{short(channel.name)}" {how} {where}.'
-        if after == before:
-            raise questions.repeated(path, text)
-        text = f"{text} Split the file there."
-        raise RecordingError(text, culprit=str(path), value=after)
+    if channel.grows:
+        return
+    row = int(np.flatnonzero(np.diff(channel.t) <= 0)[0])
+    before, after = float(channel.t[row]), float(channel.t[row + 1])
+    how = "stands still and values differ" if after == before else "runs backwards"
+    where = f"at its sample {row + 2:,} ({before:.9g} s to {after:.9g} s)"
+    text = f'{path}: the time of "{short(channel.name)}" {how} {where}.'
+    if after == before:
+        raise questions.repeated(path, text)
+    raise RecordingError(f"{text} Split the file there.", culprit=str(path), value=after)
 
 
 def _turned(channel: Channel, stated: str) -> Channel:
@@ -238,25 +235,26 @@ def _coincide(one: Channel, other: Channel) -> bool:
 
 
 def _table(
-    path: Path,
-    found: Columns,
-    channels: Mapping[str, Channel],
-    roles: Mapping[str, str],
-    base: Channel,
-    needed: Sequence[str],
+    path: Path, found: Columns, channels: Mapping[str, Channel], roles: Mapping[str, str], needed: Sequence[str]
 ) -> Columns:
+    longest = max(channels.values(), key=lambda one: len(one.t))
+    base = _base([channels[name] for name in needed], roles) or longest
     reads = {name: _read(one, base, roles.get(name, ""), name in needed) for name, one in channels.items()}
     rows = np.ones(len(base.t), bool)
     for name in (one for one in needed if one in reads):
         rows &= reads[name].valid
     if not rows.any():
-        _refuse(path, [channels[name] for name in needed if name in channels])
+        spans = " and ".join(f'"{name}" ({channels[name].span})' for name in needed if name in channels)
+        text = f"{path}: {spans} have no times in common; record them at the same time."
+        raise RecordingError(text, culprit=str(path), value=0)
     kept, rows, costly = _kept(reads, rows, roles, needed)
     names = {name: "t_original" if name == "t" else name for name in kept}
     values = {"t": base.t[rows]} | {names[name]: one.values[rows] for name, one in kept.items()}
     units = {names[name]: text for name, text in found.units.items() if name in kept} | {"t": "s"}
-    left = [name for name in found.values if name not in kept]
-    notes = (*found.notes, *_notes(path, base, kept, rows, left, costly))
+    left = [name for name in found.values if name not in kept and name not in costly]
+    notes = (*found.notes, *_notes(path, base, kept, base.t[rows]))
+    for which, some in (("that do not cover these rows", costly), ("without numbers of their own times", left)):
+        notes += (f"{path.stem}: channels {which} were left out: {listed(tuple(some))}.",) if some else ()
     return replace(found, values=values, units=units, clocks={}, notes=notes)
 
 
@@ -335,22 +333,8 @@ def _cubic(channel: Channel, left: npt.NDArray[np.int64], share: Array, line: Ar
     return np.where(even, cubic, line)
 
 
-def _refuse(path: Path, needed: Sequence[Channel]) -> None:
-    spans = " and ".join(f'"{one.name}" ({one.span})' for one in needed)
-    raise RecordingError(
-        f"{path}: {spans} have no times in common; record them at the same time.", culprit=str(path), value=0
-    )
-
-
-def _notes(
-    path: Path,
-    base: Channel,
-    kept: Mapping[str, Read],
-    rows: npt.NDArray[np.bool_],
-    left: Sequence[str],
-    costly: Sequence[str],
-) -> Iterator[str]:
-    """Say what was joined on what, at which rate each channel was sampled, and what was left out."""
+def _notes(path: Path, base: Channel, kept: Mapping[str, Read], t: Array) -> Iterator[str]:
+    """Say what was joined on what, at which rate each channel was sampled, and which samples were left out."""
     others = {name: one for name, one in kept.items() if one.channel is not base}
     if not all(one.valid.all() and np.array_equal(one.channel.t, base.t) for one in others.values()):
         together: dict[str, list[str]] = {}
@@ -358,8 +342,7 @@ def _notes(
             together.setdefault(f"({one.channel.span}) {one.how}", []).append(name)
         said = "; ".join(f"{_quoted(names)} {how}" for how, names in together.items())
         joined = f'channels with times of their own were put on the times of "{base.name}" ({base.span}): {said}.'
-        span = f"{base.t[rows][0]:.6g} s to {base.t[rows][-1]:.6g} s"
-        yield f"{path.stem}: {joined} The rows are those that all of them have, {span}."
+        yield f"{path.stem}: {joined} The rows are those that all of them have, {t[0]:.6g} s to {t[-1]:.6g} s."
     ordered: dict[str, list[str]] = {}
     for name, one in kept.items():
         for text in one.channel.done:
@@ -369,10 +352,6 @@ def _notes(
     if invalid:
         counts = ", ".join(f'{count:,} of "{name}"' for name, count in invalid.items())
         yield f"{path.stem}: invalid samples were left out: {counts}."
-    if costly:
-        yield f"{path.stem}: channels that do not cover these rows were left out: {listed(tuple(costly))}."
-    if empty := [name for name in left if name not in costly]:
-        yield f"{path.stem}: channels without numbers of their own times were left out: {listed(tuple(empty))}."
 
 
 def _quoted(names: Sequence[str]) -> str:

@@ -174,6 +174,11 @@ def listed(names: tuple[str, ...]) -> str:
     return ", ".join(short(name) for name in names[:LISTED]) + more
 
 
+def several(count: int, one: str, many: str) -> str:
+    """Say how many there are, "one row was" or "1,000 rows were"; `one` and `many` stand behind the number."""
+    return f"{count:,} {many}" if count != 1 else f"one {one}"
+
+
 def short(name: str) -> str:
     """Cut a name to what a message can hold, on one line."""
     line = " ".join(name.split()) if name.strip() else name

@@ -23,6 +23,7 @@ NAMES = frozenset(
 VALUES = frozenset(("value", "_value", "val", "reading", "data", "wert", "y"))
 """Names of the column of the readings."""
 UNITS = frozenset(("unit", "units", "einheit"))
+Channels = dict[str, np.ndarray]
 LEAST = 10
 """Readings of a signal on average: a column of remarks has less."""
 
@@ -39,14 +40,20 @@ def in_columns(path: Path, found: Columns) -> Columns:
         return found
     check_columns(path, len(signals))
     clock, readings = seconds(path, found, time), _numbers(found.values[value])
-    values, clocks = {}, {}
-    for one in signals:
-        rows = np.flatnonzero((names == one) & np.isfinite(clock))
-        rows = rows[np.argsort(clock[rows], kind="stable")]
-        values[one], clocks[one] = readings[rows], clock[rows]
+    values, clocks = by_signal(names, clock, readings)
     note = f"{path.stem}: its rows are readings of {len(signals)} signals; each became a channel with its own times."
     units = _units(found, names)
     return replace(found, values=values, units=units, clocks=clocks, numbered=False, notes=(*found.notes, note))
+
+
+def by_signal(names: np.ndarray, t: np.ndarray, readings: np.ndarray) -> tuple[Channels, Channels]:
+    """Return the readings of each signal in the order of their times, and these; readings without a time are none."""
+    values, clocks = {}, {}
+    for name in dict.fromkeys(names.tolist()):
+        rows = np.flatnonzero((names == name) & np.isfinite(t))
+        rows = rows[np.argsort(t[rows], kind="stable")]
+        values[name], clocks[name] = readings[rows], t[rows]
+    return values, clocks
 
 
 def _places(found: Columns) -> tuple[str, str, str] | None:

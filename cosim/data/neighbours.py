@@ -5,7 +5,7 @@ A neighbour has a number or a place in its name (`q2`, `joint2_position`, `axis2
 together. Whether such a column is the axis itself in other units, or its set point, only its values tell.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,14 +16,8 @@ from cosim.support.units import unit
 
 Kind = Literal["position", "speed", "acceleration"]
 KINDS: tuple[Kind, ...] = ("position", "speed", "acceleration")
-UNITS: dict[str, Kind] = {
-    "rad": "position",
-    "m": "position",
-    "rad/s": "speed",
-    "m/s": "speed",
-    "rad/s2": "acceleration",
-    "m/s2": "acceleration",
-}
+PER = dict(zip(("", "/s", "/s2"), KINDS, strict=True))
+UNITS: dict[str, Kind] = {f"{of}{per}": kind for of in ("rad", "m") for per, kind in PER.items()}
 PLACES = frozenset(
     {
         *("neighbour", "neighbor", "other", "next", "elbow", "shoulder", "wrist", "hip", "knee", "ankle", "waist"),
@@ -77,16 +71,9 @@ def _kind(name: str, text: str) -> Kind | None:
         return None
     if text and is_unit(text):
         return UNITS.get(unit(spelled(text)).si)
-    return next(_named(name), None)
-
-
-def _named(name: str) -> Iterator[Kind]:
-    """What of a motion a name tells, the highest derivative first: `q_dot` is a speed."""
-    if is_named(name, "acceleration") or "a" in words_of(name):
-        yield "acceleration"
-    for kind in ("speed", "position"):
-        if is_named(name, kind):
-            yield "speed" if kind == "speed" else "position"
+    if "a" in words_of(name):
+        return "acceleration"
+    return next((kind for kind in reversed(KINDS) if is_named(name, kind)), None)  # `q_dot` is a speed
 
 
 def _place(name: str) -> str:

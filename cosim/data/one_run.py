@@ -18,7 +18,7 @@ from cosim.data.order import in_order
 from cosim.data.questions import EMPTY, PERIOD, REPEATED
 from cosim.data.runs import equal, split, starts, text_of
 from cosim.data.sparse import filled, without_empty
-from cosim.data.times import read_clock
+from cosim.data.times import clock_of
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 from cosim.support.units import unit
@@ -133,8 +133,8 @@ def _numbered(request: Request, found: Columns, number: str) -> np.ndarray:
 
 
 def _begins(request: Request, found: Columns) -> Sequence[int]:
-    path, served = request.path, assign(replace(request, required=()), found)
+    served = assign(replace(request, required=()), found)
     if "t" not in served.values:
         return [0]
-    t = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False).values
+    t = clock_of(request.path, served).values
     return [0] if t.dtype == object else starts(t).tolist()

@@ -21,12 +21,11 @@ import numpy.typing as npt
 
 from cosim.data.assign import assign
 from cosim.data.checks import COARSE
-from cosim.data.columns import Columns, Request
-from cosim.data.limits import short
+from cosim.data.columns import Array, Columns, Request
+from cosim.data.limits import several, short
 from cosim.data.questions import REPEATED
-from cosim.data.times import DAY, read_clock
+from cosim.data.times import DAY, clock_of
 
-Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 BITS = (8, 16, 24, 32)
@@ -63,8 +62,7 @@ def in_order(request: Request, found: Columns) -> Columns:
     path, served = request.path, assign(request, found)
     if "t" not in served.values:
         return found
-    name, column = served.sources["t"], served.values["t"]
-    clock = read_clock(path, column, name, served.units.get("t", ""), servo=False).values
+    name, clock = served.sources["t"], clock_of(path, served).values
     if clock.dtype.kind not in "iuf":
         return found
     others = {key: one for key, one in found.values.items() if key != name}
@@ -117,23 +115,13 @@ def order_of(t: Array, others: Mapping[str, np.ndarray], restarts: Sequence[int]
     left = np.setdiff1d(np.arange(len(t)), kept)
     late = np.flatnonzero(np.diff(kept, prepend=-1) < 0)
     if len(left):
-        done.append(f"{_copies(len(left))}; the first is row {rows[left].min() + 1:,}.")
+        one, many = "row that repeats the time and all values of another was", "rows that repeat the time and all"
+        said = several(len(left), one, f"{many} values of others were")
+        done.append(f"{said} left out; the first is row {rows[left].min() + 1:,}.")
     if len(late):
-        done.append(f"{_late(len(late))} in the order of time; the first is row {rows[kept[late]].min() + 1:,}.")
+        said = several(len(late), "row that came late was", "rows that came late were")
+        done.append(f"{said} put in the order of time; the first is row {rows[kept[late]].min() + 1:,}.")
     return Ordered(rows[kept], t[kept], tuple(done))
-
-
-def _copies(count: int) -> str:
-    said = (
-        f"{count:,} rows that repeat the time and all values of others were"
-        if count > 1
-        else ("one row that repeats the time and all values of another was")
-    )
-    return f"{said} left out"
-
-
-def _late(count: int) -> str:
-    return f"{count:,} rows that came late were put" if count > 1 else "one row that came late was put"
 
 
 def _is_row_number(column: np.ndarray) -> bool:

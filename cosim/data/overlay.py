@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.data.columns import Array
 from cosim.data.recording import GAP, Recording
 from cosim.support.errors import RecordingError
 
-Array = npt.NDArray[np.float64]
 SHARED = 0.5
 """Share of the shorter recording from which overlapping time stamps are those of one clock."""
 BY = ("q_d", "q", "position", "v", "tau")
@@ -86,26 +85,19 @@ def _lag(first: Recording, one: Recording, by: str) -> float:
     step = max(first.sample_time, one.sample_time, (first.duration + one.duration) / GRID)
     a, b = (_at(np.arange(0, of.duration, step), of.t - of.t[0], of[by]) for of in (first, one))
     a, b = (np.nan_to_num(x - np.nanmean(x)) for x in (a, b))
-    shift = Correlation(len(a) + len(b))
-    count = shift.of(np.ones_like(a), np.ones_like(b))
-    energy = shift.of(a**2, np.ones_like(b)) + shift.of(np.ones_like(a), b**2) - 2 * shift.of(a, b)
+    size, one_a, one_b = len(a) + len(b), np.ones_like(a), np.ones_like(b)
+    count = _products(one_a, one_b, size)
+    energy = _products(a**2, one_b, size) + _products(one_a, b**2, size) - 2 * _products(a, b, size)
     enough = count >= SHARED * min(len(a), len(b))
     distance = np.where(enough, energy / np.maximum(count, 1), np.inf)
     best = int(np.argmin(distance))
-    return step * (best if best < len(a) else best - shift.size)
+    return step * (best if best < len(a) else best - size)
 
 
-@dataclass(frozen=True)
-class Correlation:
-    """Sums of products of two signals at all shifts, by FFT of `size` points."""
-
-    size: int
-
-    def of(self, one: Array, other: Array) -> Array:
-        """The sum over rows of one[k + shift] other[k], by shift; negative ones at the end."""
-        product = np.fft.rfft(one, self.size) * np.conj(np.fft.rfft(other, self.size))
-        found: Array = np.fft.irfft(product, self.size)
-        return found
+def _products(one: Array, other: Array, size: int) -> Array:
+    """The sum over rows of one[k + shift] other[k], by shift, negative ones at the end; by an FFT of `size` points."""
+    found: Array = np.fft.irfft(np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size)), size)
+    return found
 
 
 def _at(grid: Array, t: Array, values: Array) -> Array:

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim.data.held import Array, Index, held_columns, new_rows
+from cosim.data.columns import Array
+from cosim.data.held import Index, held_columns, new_rows
 from cosim.data.recording import GAP, Recording
 from cosim.data.single_readings import cleaned
 from cosim.data.start_up import settled

@@ -15,13 +15,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.data.assign import assign, units_stated
-from cosim.data.columns import Columns, Request
+from cosim.data.columns import Array, Columns, Request
 from cosim.data.formats import is_recording, read_columns
 from cosim.data.limits import check_cells, listed, short
-from cosim.data.roles import guess, is_named
+from cosim.data.roles import is_named, tell_an_axis
 from cosim.data.runs import JOINT, exists, split
 from cosim.data.times import YEARS, read_clock
 from cosim.support.errors import RecordingError
@@ -29,7 +28,6 @@ from cosim.support.files import sha256
 
 BAGS = (".mcap", ".db3", ".bag")
 """Suffixes of bags: a folder of them is one that was split, and no run of a file for each quantity."""
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,34 +40,34 @@ class Part:
     origin: int = 0
 
 
-def read_run(
-    path: Path, columns: Mapping[str, str], units: Mapping[str, str], layout: Mapping[str, str]
-) -> tuple[Columns, str]:
-    """Read the file that a path names, or the files of one run; return also the SHA-256 of what was read.
+def read_run(request: Request) -> tuple[Request, Columns, str]:
+    """Read the file that a path names, or the files of one run.
 
-    Args:
-        path: a file, which recording of it, several files with a `+` between them, or a folder of such.
-        columns: what the user says of names: which column is the time.
-        units: what the user says of units: that of the time.
-        layout: what `--layout` says.
+    Returns:
+        The request for what was read (of several files the time is named and in seconds already), its columns, and
+        the SHA-256 of the files.
 
     Raises:
         RecordingError: as `read_columns`; or a file has no time, or its time cannot be put beside the others'.
     """
-    files = files_of(path)
+    path = request.path
+    files = _files_of(path)
     if len(files) == 1:
-        return read_columns(files[0], layout), sha256(files[0])
-    parts = [_part(file, columns, units, layout) for file in files]
-    whole = [part for part in parts if _is_whole(part)]
+        return request, read_columns(files[0], request.layout), sha256(files[0])
+    parts = [_part(file, request) for file in files]
+    stated = ({name: units_stated(part.found, name) for name in part.found.values} for part in parts)
+    whole = [part for part, units_of in zip(parts, stated, strict=True) if tell_an_axis(part.found.values, units_of)]
     if whole and exists(path):
         rule = f"{whole[0].path.name} holds torque and motion alone; give one file, or those of one run with + between"
         text = f"{path} is not a file but a folder of {len(parts)} recordings: {rule}."
         raise RecordingError(text, culprit=str(path), value=len(parts))
     digest = hashlib.sha256("".join(sha256(file) for file in files).encode()).hexdigest()
-    return _joined(path, _with_times(path, parts)), digest
+    said = (request.columns, request.units)
+    columns, scales = ({key: text for key, text in one.items() if key != "t"} for one in said)
+    return replace(request, columns=columns, units=scales), _joined(path, _with_times(path, parts)), digest
 
 
-def files_of(path: Path) -> list[Path]:
+def _files_of(path: Path) -> list[Path]:
     """Return the files that a path names: one, or those of one run."""
     file, which = split(path)
     if exists(file) and file.is_dir():
@@ -83,27 +81,17 @@ def files_of(path: Path) -> list[Path]:
     return beside if all(map(exists, beside)) else [file]
 
 
-def options_within(
-    path: Path, columns: Mapping[str, str], units: Mapping[str, str]
-) -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """Return the options for what was read: of several files the time is named and in seconds already."""
-    if len(files_of(path)) == 1:
-        return columns, units
-    without = [{key: text for key, text in said.items() if key != "t"} for said in (columns, units)]
-    return without[0], without[1]
-
-
-def _part(path: Path, columns: Mapping[str, str], units: Mapping[str, str], layout: Mapping[str, str]) -> Part:
+def _part(path: Path, request: Request) -> Part:
     """Read one file and part its time from its columns."""
-    found = read_columns(path, layout)
+    found = read_columns(path, request.layout)
     if found.clocks:
         text = f"{path} holds channels with times of their own already; it is no part of a run of several files."
         raise RecordingError(text, culprit=str(path))
-    name = _time_of(path, found, columns)
+    name = _time_of(path, found, request.columns)
     if not name:
         single = found.numbered and len(found.values) == 1
         return Part(path, replace(found, values={path.stem: found.values["#1"]}) if single else found)
-    stated = units.get("t", "") or units_stated(found, name, "t")
+    stated = request.units.get("t", "") or units_stated(found, name, "t")
     clock = read_clock(path, found.values[name], name, stated, servo=True)
     if clock.values.dtype.kind not in "iuf":
         raise RecordingError(f'{path}: column "{short(name)}" holds no times.', culprit=str(path), value=name)
@@ -112,14 +100,6 @@ def _part(path: Path, columns: Mapping[str, str], units: Mapping[str, str], layo
     since = int(t[0]) if not clock.origin and len(t) and YEARS[0] <= t[0] <= YEARS[1] else 0
     notes = (*found.notes, *clock.notes)
     return Part(path, replace(found, values=rest, notes=notes), t - since, clock.origin + since * 10**9)
-
-
-def _is_whole(part: Part) -> bool:
-    """Whether a file holds torque and motion, and is a recording alone."""
-    columns, units = part.found.values, {name: units_stated(part.found, name) for name in part.found.values}
-    return all(
-        any(role in columns or guess(role, columns, units).among for role in rule) for rule in (("tau",), ("q", "v"))
-    )
 
 
 def _time_of(path: Path, found: Columns, columns: Mapping[str, str]) -> str:

@@ -1,14 +1,14 @@
 """What a file holds before it is used: its columns, what they serve as, and the options with which it can be read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 
 from cosim.data.assign import assign
 from cosim.data.columns import Columns, Request
 from cosim.data.one_run import rows_of_one
-from cosim.data.parts import options_within, read_run
+from cosim.data.parts import read_run
 from cosim.data.recording import REQUIRED, Recording
 from cosim.data.runs import named
 from cosim.data.speeds import with_speed
@@ -29,16 +29,16 @@ class Preview:
         found: its columns as they are.
         sources: our names to the file's.
         options: what has to be said to read it, by option; an example where `undecided` says so.
-        undecided: why something has to be said, one sentence each.
         refused: why it is no recording of an axis, whatever is said; empty if it can be one.
+        undecided: why something has to be said, one sentence each.
     """
 
     recording: Recording
     found: Columns
     sources: dict[str, str]
     options: Options
-    undecided: tuple[str, ...]
     refused: str
+    undecided: tuple[str, ...] = ()
 
     @property
     def said(self) -> str:
@@ -58,23 +58,22 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
         RecordingError: it is not even a table with a time.
     """
     said: Options = {name: dict((options or {}).get(name, {})) for name in ("columns", "units", "layout")}
-    found, own = read_run(path, said["columns"], said["units"], said["layout"])
-    inner = dict(zip(("columns", "units"), options_within(path, said["columns"], said["units"]), strict=True))
-    said |= {name: dict(pairs) for name, pairs in inner.items()}
+    request, found, own = read_run(Request(path, said["columns"], said["units"], said["layout"]))
+    said |= {"columns": dict(request.columns), "units": dict(request.units)}
     undecided: list[str] = []
     for _ in range(TRIES):
         try:
-            return _judged(path, own, found, said, tuple(undecided))
+            return replace(_judged(path, own, found, said), undecided=tuple(undecided))
         except UndecidedError as error:
             undecided.append(str(error))
             said = {name: error.decided_by.get(name, {}) | pairs for name, pairs in said.items()}
     raise RecordingError(undecided[-1], culprit=str(path))
 
 
-def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tuple[str, ...]) -> Preview:
+def _judged(path: Path, own: str, found: Columns, said: Options) -> Preview:
     """The file as an axis; else as what it holds of one: a torque or a position without the other, or a table."""
     try:
-        return _read(path, own, found, said, undecided, REQUIRED)
+        return _read(path, own, found, said, REQUIRED)
     except (UndecidedError, ManyRecordingsError):
         raise
     except RecordingError as error:
@@ -84,21 +83,13 @@ def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tupl
     if lacking in REQUIRED and lacking not in found.lacks:
         try:
             rest = tuple(rule for rule in REQUIRED if rule != lacking)
-            return _read(path, own, found, said, undecided, rest, refused)
+            return _read(path, own, found, said, rest, refused)
         except RecordingError:
             pass  # then nothing of it is served
-    return _read(path, own, found, said, undecided, (), refused)
+    return _read(path, own, found, said, (), refused)
 
 
-def _read(
-    path: Path,
-    own: str,
-    found: Columns,
-    said: Options,
-    undecided: tuple[str, ...],
-    required: tuple[str, ...],
-    refused: str = "",
-) -> Preview:
+def _read(path: Path, own: str, found: Columns, said: Options, required: tuple[str, ...], refused: str = "") -> Preview:
     request = Request(path, **said, required=required)
     timed = rows_of_one(request, found)
     if refused:
@@ -108,4 +99,4 @@ def _read(
     recording = Recording.judged(request, named(path), timed, own)
     served = assign(request, timed)
     served = with_speed(path, timed, served, said["units"]) if required == REQUIRED else served
-    return Preview(recording, timed, served.sources, said, undecided, refused)
+    return Preview(recording, timed, served.sources, said, refused)

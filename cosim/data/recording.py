@@ -19,11 +19,11 @@ from cosim.data.assumed import assumed
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns, Request, as_columns, sha256_of
 from cosim.data.one_run import rows_of_one, timed
-from cosim.data.parts import options_within, read_run
+from cosim.data.parts import read_run
 from cosim.data.registers import at_an_end, continued
 from cosim.data.runs import named
 from cosim.data.speeds import with_speed
-from cosim.data.times import read_clock
+from cosim.data.times import clock_of
 from cosim.support.errors import OutputError, RecordingError
 from cosim.support.files import replacing
 from cosim.support.html import table as html_table
@@ -92,9 +92,7 @@ class Recording:
             UnitError: a unit is unknown.
         """
         path, layout = Path(path), dict(layout or {})
-        found, own = read_run(path, columns or {}, units or {}, layout)
-        columns, units = options_within(path, columns or {}, units or {})
-        request = Request(path, columns, units, layout, required)
+        request, found, own = read_run(Request(path, columns or {}, units or {}, layout, required))
         one = cls.judged(request, named(path), rows_of_one(request, found), own)
         return replace(one, origin=one.origin | {"period": layout["period"]}) if "period" in layout else one
 
@@ -125,7 +123,7 @@ class Recording:
         values, stated = served.values, served.units
         stated |= {"q_d": stated["q"]} if "q" in stated and "q_d" in values and "q_d" not in stated else {}
         check_names(path, values, required, stated)
-        clock = read_clock(path, values["t"], served.sources["t"], stated.get("t", ""), bool(required))
+        clock = clock_of(path, served, bool(required))
         values, stated = values | {"t": clock.values}, stated | ({"t": clock.unit} if clock.unit else {})
         others = {key: column for key, column in values.items() if column.dtype == object}
         told = others if "components" in found.origin else {}  # a run of ours has text on purpose

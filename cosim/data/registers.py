@@ -22,9 +22,9 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
+from cosim.data.columns import Array
 from cosim.support.units import unit
 
-Array = npt.NDArray[np.float64]
 SIGNED = ("tau", "v")
 """Columns that may have lost their sign."""
 TURNS = (2 * pi, 360.0)

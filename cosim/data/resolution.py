@@ -11,11 +11,10 @@ Readings that are repeated because they are held (`held`) count once.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.data.columns import Array
 from cosim.data.held import rows_held
 
-Array = npt.NDArray[np.float64]
 ROWS = 100_000
 """Rows that are looked at: enough to meet each small multiple of a step thousands of times."""
 ALIKE = 1e-3

@@ -116,6 +116,12 @@ def is_speed(name: str) -> bool:
     return _is(name, *_SPEED)
 
 
+def tell_an_axis(names: Collection[str], units: Mapping[str, str]) -> bool:
+    """Whether columns tell of torque and of motion."""
+    rules = (("tau",), ("q", "v"))
+    return all(any(role in names or guess(role, names, units).among for role in rule) for rule in rules)
+
+
 def counts(name: str, stated: str) -> bool:
     """Whether a position is in counts of an encoder."""
     return stated in ("count", "counts") or (not stated and any(word in COUNTED for word in words_of(name)))

@@ -1,7 +1,7 @@
 """A file of many recordings: where each begins, and what tells it from the others."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,8 +35,8 @@ class Run:
 def split(path: Path | str) -> tuple[Path, str]:
     """Return the file, and what stands after a colon behind its name: `run=3`, `#3`; empty where nothing does."""
     text = str(path)
-    colons = [] if _is_file(text) else [place for place, sign in enumerate(text) if sign == ":"]
-    place = next((one for one in colons if _is_file(text[:one])), len(text))
+    places = [len(text), *(place for place, sign in enumerate(text) if sign == ":")]
+    place = next((one for one in places if exists(Path(text[:one]), Path.is_file)), len(text))
     return Path(text[:place]), text[place + 1 :]
 
 
@@ -72,10 +72,14 @@ def many(path: Path, values: Mapping[str, np.ndarray], t: np.ndarray, where: str
 
 def taken(path: Path, runs: Sequence[Run]) -> str:
     """Say how the first of several is taken, by what tells it apart and by its number."""
-    joint = "," if ":" in path.name else ":"
     first = runs[0].which
-    by_name = f"{path.name}{joint}{first}, or by number, " if first != "#1" and len(first) <= NAME else ""
-    return f"{by_name}{path.name}{joint}#1 to #{len(runs)}"
+    by_name = f"{_typed(path)}{first}, or by number, " if first != "#1" and len(first) <= NAME else ""
+    return f"{by_name}{_typed(path)}#1 to #{len(runs)}"
+
+
+def _typed(path: Path) -> str:
+    """The name of a file as it is typed in front of what takes one of its recordings."""
+    return f"{path.name}{',' if ':' in path.name else ':'}"
 
 
 def mixed(path: Path, values: Mapping[str, np.ndarray], t: np.ndarray) -> str:
@@ -85,9 +89,8 @@ def mixed(path: Path, values: Mapping[str, np.ndarray], t: np.ndarray) -> str:
         which = [f"{name}={text_of(column[rows[0]])}" for rows in parts]
         grow = all(len(rows) > 1 and bool((np.diff(t[rows]) > 0).all()) for rows in parts)
         if len(parts) > 1 and grow and all(map(TYPED.fullmatch, which)):
-            joint = "," if ":" in path.name else ":"
             told = f'rows of {len(parts)} recordings are mixed, and "{short(name)}" tells them apart'
-            return f"{told}; take one, {path.name}{joint}{which[0]} to {which[-1]}."
+            return f"{told}; take one, {_typed(path)}{which[0]} to {which[-1]}."
     return ""
 
 
@@ -134,16 +137,9 @@ def _differ(texts: list[str]) -> bool:
     return len(set(texts)) == len(texts)
 
 
-def exists(path: Path) -> bool:
+def exists(path: Path, is_one: Callable[[Path], bool] = Path.exists) -> bool:
     """Whether there is a file or folder; a name that is too long, or holds a zero byte, has none."""
     try:
-        return path.exists()
+        return is_one(path)
     except (OSError, ValueError):
-        return False
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return Path(text).is_file()
-    except (OSError, ValueError):  # a name that is too long, or holds a zero byte
         return False

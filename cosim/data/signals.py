@@ -125,9 +125,8 @@ class Samples:
         self._values, self._name = np.asarray(values, dtype=np.float64), name
         self.outputs: Mapping[str, str] = {"value": unit}
         if self._values.ndim > 1:
-            message = (
-                f'The signal "{name}" has the shape {self._values.shape}; it must be one value a tick, or a number.'
-            )
+            rule = "it must be one value a tick, or a number"
+            message = f'The signal "{name}" has the shape {self._values.shape}; {rule}.'
             raise SignalError(message, culprit=name, value=self._values.shape)
 
     @property
@@ -137,7 +136,9 @@ class Samples:
 
     def stream(self, step: float) -> Stream:
         """Make a stream of the array."""
-        return self._take
+        if self.constant:
+            return lambda ticks: np.full((1, len(ticks)), float(self._values))
+        return lambda ticks: self._values[ticks[0] : ticks[-1] + 1][np.newaxis]
 
     def check(self, ticks: int) -> None:
         """Refuse a run that is longer than the array.
@@ -145,14 +146,9 @@ class Samples:
         Raises:
             SignalError: there are fewer values than ticks.
         """
-        if self._values.ndim and len(self._values) < ticks:
+        if not self.constant and len(self._values) < ticks:
             message = f'The signal "{self._name}" has {len(self._values):,} samples; the run needs {ticks:,}.'
             raise SignalError(message, culprit=self._name, value=len(self._values))
-
-    def _take(self, ticks: np.ndarray) -> np.ndarray:
-        if self._values.ndim == 0:
-            return np.full((1, len(ticks)), float(self._values))
-        return self._values[ticks[0] : ticks[-1] + 1][np.newaxis]
 
 
 Generator = Annotated[

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from cosim.data.columns import Array
 from cosim.data.recording import Recording
 from cosim.data.resolution import resolution
 
-Array = npt.NDArray[np.float64]
 READ = ("q", "v", "q_d", "temperature")
 """Columns that follow something that moves smoothly; each is judged by the bends around a place."""
 LONGEST = 3
@@ -73,7 +73,8 @@ def cleaned(recording: Recording) -> Recording:
         for run in runs:
             table[name][run.rows] = run.values
     notes = tuple(_note(recording, name, runs) for name, runs in found.items())
-    spans = sorted({_span(recording.t, run) for name, runs in found.items() for run in runs if name != "temperature"})
+    bridged = (run.rows for name, runs in found.items() for run in runs if name != "temperature")
+    spans = sorted({(float(recording.t[rows.start]), float(recording.t[rows.stop - 1])) for rows in bridged})
     masked = (*recording.masked, *spans)
     return replace(recording, table=table, notes=(*recording.notes, *notes), masked=masked)
 
@@ -139,7 +140,8 @@ def _judged(values: Array, limit: Array, first: int, rows: int) -> Run | None:
         return None
     degree = len(around) - 1 if len(around) == 4 else 1
     inside = np.arange(first, last)
-    curve = _through(around - first, values[around], degree)(inside - first)
+    fitted = np.polynomial.polynomial.polyfit(around - first, values[around], degree)  # a cubic between four, or a line
+    curve = np.polynomial.Polynomial(fitted)(inside - first)
     distance = np.abs(values[inside] - curve)
     beside = 3 if len(around) == 4 else 3 + LONGEST
     patch = values[max(0, first - beside) : last + beside].copy()
@@ -148,15 +150,6 @@ def _judged(values: Array, limit: Array, first: int, rows: int) -> Run | None:
     most = float(limit[first]) * (1.0 if len(around) == 4 else AT_AN_END)
     is_false = distance.min() > max(most, RATIO * left) and left < limit[first]
     return Run(first, curve) if is_false else None
-
-
-def _through(x: Array, y: Array, degree: int) -> np.polynomial.Polynomial:
-    """The curve through the neighbours of a run: a cubic between four of them, else a line."""
-    return np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(x, y, degree))
-
-
-def _span(t: Array, run: Run) -> tuple[float, float]:
-    return float(t[run.rows.start]), float(t[run.rows.stop - 1])
 
 
 def _note(recording: Recording, name: str, runs: list[Run]) -> str:

@@ -18,10 +18,10 @@ from cosim.data.assign import assign
 from cosim.data.checks import chosen
 from cosim.data.columns import Columns, Request
 from cosim.data.joining import LEAST, on_one_time
-from cosim.data.limits import LARGEST, listed
+from cosim.data.limits import LARGEST, listed, several
 from cosim.data.order import order_of
 from cosim.data.questions import EMPTY, PERIOD
-from cosim.data.times import read_clock
+from cosim.data.times import clock_of
 
 SPARSE = 0.2
 """Share of the rows without a value from which on they are no invalid samples: the column has times of its own."""
@@ -40,7 +40,7 @@ def filled(request: Request, found: Columns) -> Columns:
     if "t" not in served.values or not any(_is_sparse(served.values[name]) for name in needed):
         return found
     name = served.sources["t"]
-    clock = read_clock(request.path, served.values["t"], name, served.units.get("t", ""), servo=bool(request.required))
+    clock = clock_of(request.path, served, servo=bool(request.required))
     if clock.values.dtype.kind not in "iuf":
         return found
     t = clock.seconds
@@ -105,9 +105,8 @@ def without_empty(request: Request, found: Columns) -> Columns:
 
 
 def _dropped_note(path: Path, which: str, rows: np.ndarray) -> str:
-    count, first = int(rows.sum()), int(np.flatnonzero(rows)[0]) + 1
-    said = f"{count:,} rows {which} were" if count > 1 else f"one row {which} was"
-    return f"{path.stem}: {said} left out; the first is row {first:,}."
+    said = several(int(rows.sum()), f"row {which} was", f"rows {which} were")
+    return f"{path.stem}: {said} left out; the first is row {int(np.argmax(rows)) + 1:,}."
 
 
 def _begins_again(t: np.ndarray, found: Columns, name: str, there: Mapping[str, np.ndarray]) -> bool:

@@ -17,19 +17,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.data import questions
 from cosim.data.assign import OURS, Assigned, units_stated
-from cosim.data.columns import Columns
+from cosim.data.columns import Array, Columns
 from cosim.data.limits import LARGEST, listed, short
 from cosim.data.registers import continued
 from cosim.data.roles import is_named, is_speed
 from cosim.data.text.unit_words import is_known, spelled
-from cosim.data.times import FASTEST, SECONDS, SLOWEST, read_clock
+from cosim.data.times import FASTEST, SECONDS, SLOWEST, clock_of
 from cosim.support.units import unit
 
-Array = npt.NDArray[np.float64]
 PARTS = 400
 """Parts of a recording over which increments are taken: short beside a motion, long beside a step of an encoder."""
 LEAST = 20
@@ -137,7 +135,7 @@ def _speed(path: Path, found: Columns, served: Assigned, name: str) -> Speed | N
     """Compare a column with the slope of the position."""
     if not _is_numeric(served.values[name]):
         return None
-    clock = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False)
+    clock = clock_of(path, served)
     if clock.values.dtype == object:
         return None
     t = clock.seconds
@@ -259,7 +257,7 @@ def _check_accelerations(path: Path, found: Columns, served: Assigned, given: Ma
             continue
         stated = served.units.get("q", "")
         q, a = _si(served.values["q"], stated), _si(served.values[name], units_stated(found, name))
-        clock = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False)
+        clock = clock_of(path, served)
         k = _times_bend(clock.seconds, q, a)
         if _near(k, within=BENDS_NEAR):
             continue

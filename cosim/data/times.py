@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data import questions
+from cosim.data.assign import Assigned
 from cosim.data.limits import short
 from cosim.data.roles import is_named
 from cosim.data.text.unit_words import is_unit
@@ -52,6 +53,11 @@ class Clock:
     def size(self) -> float:
         """Seconds of one unit."""
         return units.unit(self.unit).factor if self.unit else 1.0
+
+
+def clock_of(path: Path, served: Assigned, servo: bool = False) -> Clock:
+    """Return the time among columns under our names as `read_clock` reads it."""
+    return read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo)
 
 
 def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bool) -> Clock:

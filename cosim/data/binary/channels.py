@@ -25,6 +25,28 @@ MOST_BESIDE = 100
 """Signals of one table: of two dimensions the longer one is time, as tools for simulation log to arrays."""
 
 
+def columns_of_arrays(path: Path, found: Mapping[str, np.ndarray], units: Mapping[str, str], sign: str = "") -> Columns:
+    """Return the arrays of a file as channels with times of their own, else those of the commonest length as a table.
+
+    Args:
+        path: the file, for messages and notes.
+        found: arrays by their whole names.
+        units: the units that the file states, by name.
+        sign: what parts a name from its group, where names are long: in a table the last part is the name if it tells.
+
+    Raises:
+        RecordingError: as `with_clocks`.
+    """
+    if channels := with_clocks(path, found, units):
+        return channels
+    names = _last_parts(found, sign) if sign else {name: name for name in found}
+    table = {names[name]: array for name, array in found.items()}
+    values = vectors(path, table)
+    stated = {names.get(name, name): text for name, text in units.items() if text}
+    kept = {name: text for name, text in stated.items() if name in values}
+    return Columns(values, kept, notes=_left_out(path, table, values))
+
+
 def with_clocks(path: Path, found: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Columns | None:
     """Return the arrays of a file as channels with times of their own; None where they have one time, or none.
 
@@ -77,6 +99,13 @@ def _is_time(name: str, column: np.ndarray) -> bool:
     return own and float(np.mean(np.diff(column.astype(np.float64)) > 0)) >= GROWS
 
 
+def _last_parts(names: Collection[str], sign: str) -> dict[str, str]:
+    """Return for each path its last part, where no other path has it; else the whole."""
+    last = {name: name.rpartition(sign)[2] for name in names}
+    often = Counter(last.values())
+    return {name: one if often[one] == 1 else name for name, one in last.items()}
+
+
 def _short(names: Sequence[str]) -> dict[str, str]:
     """Return for each name its last part where that is the only one; that of its group where it says nothing."""
     parts = {name: grouped(name) for name in names}
@@ -108,7 +137,7 @@ def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     }
 
 
-def left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) -> tuple[str, ...]:
+def _left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) -> tuple[str, ...]:
     """Note the arrays of numbers that `vectors` did not keep; a number alone is a setting and needs no note."""
     numeric = [name for name, value in found.items() if value.dtype.kind in "fiub" and value.size > 1]
     lost = [name for name in numeric if name not in kept and f"{name}_1" not in kept]

@@ -14,7 +14,7 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from cosim.data.binary.channels import is_table, left_out, vectors, with_clocks
+from cosim.data.binary.channels import columns_of_arrays, is_table, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import check_columns, check_unpacked, listed
 from cosim.support.errors import RecordingError
@@ -44,20 +44,12 @@ def _archive(path: Path) -> Columns:
                 array = _array(path, file, member.file_size)
             found |= {} if array is None else _fields(name, array)
             pickled += [name] if array is None else []
-    notes = (
-        (f"{path.stem}: pickled objects were left out, as they are programs: {listed(tuple(pickled))}.",)
-        if pickled
-        else ()
-    )
     if not any(value.dtype.kind in "fiub" and value.ndim for value in found.values()):
-        raise RecordingError(
-            f"{path} holds no arrays of numbers; it holds: {listed(tuple(members))}.", culprit=str(path)
-        )
-    found = _named(found)
-    if channels := with_clocks(path, found, {}):
-        return replace(channels, notes=notes + channels.notes)
-    values = vectors(path, found)
-    return Columns(values, notes=notes + left_out(path, found, values))
+        text = f"{path} holds no arrays of numbers; it holds: {listed(tuple(members))}."
+        raise RecordingError(text, culprit=str(path))
+    columns = columns_of_arrays(path, _named(found), {})
+    note = f"{path.stem}: pickled objects were left out, as they are programs: {listed(tuple(pickled))}."
+    return replace(columns, notes=(note, *columns.notes)) if pickled else columns
 
 
 def _single(path: Path) -> Columns:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.channels import left_out, vectors, with_clocks
+from cosim.data.binary.channels import columns_of_arrays
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import NUMBER, check_cells, check_unpacked, short
 from cosim.data.text.table import as_array
@@ -50,11 +50,7 @@ def _of_one_row(path: Path, table: Any, units: Mapping[str, str]) -> Columns | N
     arrays = {name: as_array(pa.chunked_array([cell])) for name, cell in cells.items()}
     if not any(one.dtype.kind == "f" and len(one) > 1 for one in arrays.values()):
         return None
-    if channels := with_clocks(path, arrays, units):
-        return channels
-    values = vectors(path, arrays)
-    stated = {name: units[name] for name in values if units.get(name)}
-    return Columns(values, stated, notes=left_out(path, arrays, values))
+    return columns_of_arrays(path, arrays, units)
 
 
 def _check_declared(path: Path, metadata: Any) -> list[str]:

@@ -1,4 +1,7 @@
-"""Cells that hold more than a number: one with its unit, `12.3 deg`, or a list, `[0.1, 0.2]`, as pandas writes it."""
+"""What stands beside numbers in a text: units and lists in cells, comments, and MATLAB's brackets.
+
+A cell may hold a number with its unit, `12.3 deg`, or a list, `[0.1, 0.2]`, as pandas writes it.
+"""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.data.limits import check_cells, short
+from cosim.data.limits import check_cells, several, short
 from cosim.data.text.unit_words import is_unit, spelled
 from cosim.support.errors import RecordingError
 
@@ -22,6 +25,17 @@ LEAST = 5
 LIST = re.compile(r"[\[(]+\s*[-+.\d][-+.\deE,;\s]*[\])]+")
 BARE = re.compile(rb"(?<=[,;\t])[ \t]*(\[+[ \t]*[-+.\d][-+.\deE, \t]*\]+)")
 """A list in a cell that no quotes keep together."""
+COMMENT = re.compile(rb"^[ \t]*(?:#(?!N|V|\d)|%|//)[^\n]*\n?", re.MULTILINE)
+"""A line that is a comment; `#N/A` and `#NV` stand for no value, and `#3` is no comment either."""
+BEHIND = re.compile(rb"^([ \t]*[+-]?\.?\d[^%#\n]*?)[ \t]+(?:%|//|#)[ \t]*[A-Za-z][^\n]*", re.MULTILINE)
+"""A comment behind the numbers of a row."""
+ENDS = re.compile(rb";[ \t]*(?=\r?$)", re.MULTILINE)
+OPENS = re.compile(rb"^([ \t]*)[\w.]+[ \t]*=[ \t]*\[[ \t]*(?:\.\.\.)?", re.MULTILINE)
+"""A matrix begins: `log = [`."""
+CLOSES = re.compile(rb"\][ \t]*;?[ \t]*(?=\r?$)", re.MULTILINE)
+SEPARATED = re.compile(r"\S[ \t,]+\S")
+ENDED = 0.8
+"""Share of the lines with digits that must end with a semicolon for it to end rows and not to part columns."""
 
 
 def with_quotes(data: bytes, lines: Sequence[str]) -> bytes:
@@ -79,3 +93,31 @@ def lists_of(path: Path, column: np.ndarray) -> list[np.ndarray]:
         return [*np.array(rows, np.float64).T]
     except ValueError:
         return []
+
+
+def without_comments(path: Path, body: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """Leave out lines between samples that are comments, with a note."""
+    if not any(sign in body for sign in (b"#", b"%", b"//")):
+        return body, ()
+    lines = [found.group().decode("utf-8", "replace").strip() for found in COMMENT.finditer(body)]
+    body = COMMENT.sub(b"", body)
+    if not lines:
+        return body, ()
+    said = several(len(lines), "comment was", "comments were")
+    return body, (f"{path.stem}: {said} left out between the samples, such as {short(lines[-1])!r}.",)
+
+
+def without_remarks(data: bytes) -> bytes:
+    """Return a text without the comments behind the numbers of its rows."""
+    return BEHIND.sub(rb"\1", data) if any(sign in data for sign in (b" %", b" #", b" //", b"\t%", b"\t#")) else data
+
+
+def without_brackets(data: bytes, lines: Sequence[str]) -> bytes:
+    """Return a text whose rows end with a semicolon, as those of MATLAB, without it and the brackets of a matrix."""
+    rows = [
+        line.strip() for line in lines if any(sign.isdigit() for sign in line) and not line.lstrip().startswith("%")
+    ]
+    ended = [row for row in rows if row.endswith(";") and row.count(";") == 1 and SEPARATED.search(row)]
+    if len(ended) < 2 or len(ended) < ENDED * len(rows):
+        return data
+    return ENDS.sub(b"", CLOSES.sub(b"", OPENS.sub(rb"\1", data)))

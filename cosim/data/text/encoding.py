@@ -29,13 +29,19 @@ def text_of(path: Path, encoding: str = "") -> tuple[bytes, str]:
     Raises:
         RecordingError: it is too long, no text, or not of the stated encoding.
     """
-    raw = _unpacked(path) if path.suffix.lower() == ".gz" else _plain(path)
+    if path.suffix.lower() == ".gz":
+        raw = _unpacked(path)
+    else:
+        check_text(path, path.stat().st_size)
+        raw = path.read_bytes()
     mark = next((mark for mark in MARKS if raw.startswith(mark)), b"")
     name = encoding or MARKS.get(mark) or _guessed(path, raw[:HEAD])
     data = raw[len(mark) :] if mark else raw
     if name != "utf-8":
         data = _decoded(path, data, name).encode()
-    _check_nul(path, data)
+    if (place := data.find(b"\0")) >= 0:
+        text = f"{path} holds a zero byte at byte {place + 1:,}: it was not written to its end, or is no text."
+        raise RecordingError(text, culprit=str(path), value=place)
     return _lines(data), name
 
 
@@ -44,11 +50,6 @@ def _lines(data: bytes) -> bytes:
     if b"\r" not in data or data.count(b"\r") == data.count(b"\r\n"):
         return data
     return re.sub(rb"\r+\n|\r", b"\n", data)
-
-
-def _plain(path: Path) -> bytes:
-    check_text(path, path.stat().st_size)
-    return path.read_bytes()
 
 
 def _unpacked(path: Path) -> bytes:
@@ -90,9 +91,3 @@ def _decoded(path: Path, data: bytes, encoding: str) -> str:
             f"{path} is no {encoding} at byte {error.start:,}; --layout encoding=cp1252 (or another) says what it is."
         )
         raise RecordingError(text, culprit=str(path), value=encoding) from None
-
-
-def _check_nul(path: Path, data: bytes) -> None:
-    if (place := data.find(b"\0")) >= 0:
-        text = f"{path} holds a zero byte at byte {place + 1:,}: it was not written to its end, or is no text."
-        raise RecordingError(text, culprit=str(path), value=place)

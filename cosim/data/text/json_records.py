@@ -87,17 +87,14 @@ def columns_of(path: Path, data: bytes) -> Columns:
     tables = list(_tables(path, value))
     if not tables:
         text = f"{path} holds no table: neither records with numbers, nor lists of them of one length"
-        raise RecordingError(
-            f"{text}; it begins with {short(data[:60].decode('utf-8', 'replace'))!r}.", culprit=str(path)
-        )
+        begins = short(data[:60].decode("utf-8", "replace"))
+        raise RecordingError(f"{text}; it begins with {begins!r}.", culprit=str(path))
     table = max(tables, key=lambda one: one.size)
-    found, numbered = table.found, table.numbered
-    others = tuple(one.name or "the file's own members" for one in tables if one is not table)
-    chosen = table.name or "the file's own members"
-    notes += (f"{path.stem}: of its tables {chosen} was read; left out: {listed(others)}.",) if others else ()
-    arrays = {name: _array(cells) for name, cells in found.items()}
+    chosen, *others = (one.name or "the file's own members" for one in [table, *(x for x in tables if x is not table)])
+    notes += (f"{path.stem}: of its tables {chosen} was read; left out: {listed(tuple(others))}.",) if others else ()
+    arrays = {name: _array(cells) for name, cells in table.found.items()}
     stated = _units(value) if isinstance(value, dict) else {}
-    return Columns(arrays, {k: u for k, u in stated.items() if k in arrays}, notes=notes, numbered=numbered)
+    return Columns(arrays, {k: u for k, u in stated.items() if k in arrays}, notes=notes, numbered=table.numbered)
 
 
 def _value(path: Path, data: bytes) -> tuple[Any, tuple[str, ...]]:
@@ -231,14 +228,10 @@ def _units(value: Mapping[str, Any]) -> dict[str, str]:
 
 def _array(cells: Sequence[Any]) -> np.ndarray:
     """Return a column: numbers where all are numbers or nothing, integers that a double would cut exact, else text."""
-    if all(cell is None or isinstance(cell, int | float) for cell in cells):
-        if all(type(cell) is int for cell in cells) and any(abs(cell) > 2**53 for cell in cells):
-            return np.array(cells, dtype=np.int64) if all(abs(cell) < 2**63 for cell in cells) else _doubles(cells)
-        return _doubles(cells)
-    return np.array([None if cell is None else str(cell) for cell in cells], dtype=object)
-
-
-def _doubles(cells: Sequence[Any]) -> np.ndarray:
+    if not all(map(_is_number, cells)):
+        return np.array([None if cell is None else str(cell) for cell in cells], dtype=object)
+    if all(type(cell) is int for cell in cells) and 2**53 < max(map(abs, cells), default=0) < 2**63:
+        return np.array(cells, dtype=np.int64)
     return np.array([_number(cell) for cell in cells], dtype=np.float64)
 
 
@@ -250,4 +243,5 @@ def _number(cell: Any) -> float:
 
 
 def _is_number(cell: Any) -> bool:
+    """Whether a cell is a number or nothing."""
     return cell is None or isinstance(cell, int | float)

@@ -122,8 +122,7 @@ def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> 
         return score, _stated(lines, rows, Layout(separator, decimal, count, first), header)
     found = header_of(lines[:first], _samples(rows, first, count), separator, count)
     labels = () if found.units else _labels(rows[:first], count)
-    layout = Layout(separator, decimal, count, first, found.names, found.units, labels)
-    layout = replace(layout, line=found.line, sample=found.sample, torn=found.torn)
+    layout = Layout(separator, decimal, count, first, labels=labels, **vars(found))
     return score * (NAMED if found.names else 1.0), layout
 
 

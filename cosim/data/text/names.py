@@ -77,9 +77,8 @@ def unit_of_name(name: str, role: str = "") -> str:
     """
     whole = split_unit(name)[1]
     if not is_unit(whole) and (enclosed := bracketed(name)) and not is_unit(enclosed):
-        return (
-            _of_time(name) if role == "t" else ""
-        )  # what stands in brackets and is not known is asked for: `Winkel (kGrad)` is not in degrees
+        # What stands in brackets and is not known is asked for: `Winkel (kGrad)` is not in degrees.
+        return _of_time(name) if role == "t" else ""
     text = whole if is_unit(whole) else suffixed_unit(name, role)
     if role == "tau" and text == "nm":
         return "N.m"  # in small letters as the rest of such names; a torque is in no nanometres

@@ -9,8 +9,7 @@ import numpy as np
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns, short
 from cosim.data.text import json_records, transposed
-from cosim.data.text.cells import with_quotes, without_units
-from cosim.data.text.cleaning import without_brackets, without_remarks
+from cosim.data.text.cells import with_quotes, without_brackets, without_remarks, without_units
 from cosim.data.text.encoding import text_of
 from cosim.data.text.layout import find_layout
 from cosim.data.text.table import table_of

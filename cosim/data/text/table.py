@@ -12,8 +12,7 @@ from pyarrow import csv
 
 from cosim.data.columns import Columns, doubles
 from cosim.data.limits import check_cells, short
-from cosim.data.text.cells import lists_of
-from cosim.data.text.cleaning import without_comments
+from cosim.data.text.cells import lists_of, without_comments
 from cosim.data.text.fields import NOTHING, is_number
 from cosim.data.text.header import CLOCK_FORMAT, LABEL, NO_UNIT
 from cosim.data.text.layout import MANY_SHORT, Layout
@@ -161,10 +160,8 @@ def _filled(path: Path, body: bytes, layout: Layout, missing: int) -> tuple[Any,
     whole = [line + sign if line.count(sign) == layout.count - 2 else line for line in lines]
     table, notes = _parsed(path, b"\n".join(whole), layout)
     name = layout.names[-1] if layout.names else f"#{layout.count}"
-    return table, (
-        *notes,
-        f'{path.stem}: {missing:,} rows end before the last column, "{short(name)}"; it is empty there.',
-    )
+    note = f'{path.stem}: {missing:,} rows end before the last column, "{short(name)}"; it is empty there.'
+    return table, (*notes, note)
 
 
 def _check_utf8(path: Path, body: bytes) -> None:
@@ -202,10 +199,7 @@ def _read(body: bytes, layout: Layout, odd: Any) -> Any:
     )
 
 
-Contradictions = dict[str, tuple[str, str]]
-
-
-def names_of(layout: Layout) -> tuple[list[str], dict[str, str], Contradictions]:
+def names_of(layout: Layout) -> tuple[list[str], dict[str, str], dict[str, tuple[str, str]]]:
     """Return the name of each column, the units that names and a row of units state, and where these contradict.
 
     Columns that differ by their unit alone keep it in their name; those of one name have their number there.
@@ -227,11 +221,7 @@ def _stated(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
     """Return units by the names of their columns; one that is not known is kept, so that it is asked for."""
     rows = {name: text.strip("[]() ") for name, text in zip(names, texts, strict=False)}
     said = {name: text for name, text in rows.items() if text.lower() not in NO_UNIT and not LABEL.search(text.lower())}
-    return {name: spelled(text) for name, text in said.items() if not _is_clock(text)}
-
-
-def _is_clock(text: str) -> bool:
-    return CLOCK_FORMAT.fullmatch(text) is not None
+    return {name: spelled(text) for name, text in said.items() if not CLOCK_FORMAT.fullmatch(text)}
 
 
 def _distinct(bare: Sequence[str], whole: Sequence[str]) -> list[str]:

@@ -7,7 +7,6 @@ Few long lines of equally many numbers are read so, and no others: a table with 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,13 +29,8 @@ HEAD = 4096
 """Bytes of a line by which its separator is judged."""
 
 
-@dataclass(frozen=True)
-class Signal:
-    """A line: its name and unit, as far as they are there, and its numbers as they are written."""
-
-    name: str
-    unit: str
-    numbers: Sequence[str]
+Signal = tuple[str, str, Sequence[str]]
+"""A line: its name and unit, as far as they are there, and its numbers as they are written."""
 
 
 def read(path: Path, data: bytes) -> Columns | None:
@@ -50,8 +44,8 @@ def read(path: Path, data: bytes) -> Columns | None:
         return None
     check_cells(path, max(line.count(separator) for line in long), len(long))
     signals = [_signal(line.rstrip(f"{separator};"), separator) for line in long]
-    count = len(signals[0].numbers)
-    if any(len(one.numbers) != count for one in signals) or count < max(SAMPLES, LONGER * len(signals)):
+    count = len(signals[0][2])
+    if any(len(numbers) != count for _, _, numbers in signals) or count < max(SAMPLES, LONGER * len(signals)):
         return None
     return _columns(path, signals, separator)
 
@@ -62,17 +56,20 @@ def _signal(line: str, separator: str) -> Signal:
     first = next((place for place, field in enumerate(fields) if is_value(field, ".") or is_value(field, ",")), 0)
     lead = fields[:first]
     unit = lead.pop() if len(lead) > 1 and is_unit(lead[-1].strip("[]() ")) else ""
-    return Signal(" ".join(lead).lstrip("#% "), unit, fields[first:])
+    return " ".join(lead).lstrip("#% "), unit, fields[first:]
 
 
 def _columns(path: Path, signals: Sequence[Signal], separator: str) -> Columns | None:
-    decimal = "," if separator != "," and any("," in text for one in signals for text in one.numbers[:SAMPLES]) else "."
+    decimal = "," if separator != "," and any("," in text for *_, one in signals for text in one[:SAMPLES]) else "."
+    plain = [[text.replace(decimal, ".") for text in numbers] for *_, numbers in signals]
     try:
-        arrays = [_array(one.numbers, decimal) for one in signals]
+        arrays = [np.array([np.nan if text in NOTHING else float(text) for text in one]) for one in plain]
     except ValueError:
         return None
-    named = all(one.name for one in signals)
-    layout = Layout(separator, decimal, len(signals), 0, *_words(signals) if named else ((), ()))
+    named = all(name for name, _, _ in signals)
+    words = tuple(name for name, _, _ in signals) if named else ()
+    stated = tuple(text for _, text, _ in signals) if named else ()
+    layout = Layout(separator, decimal, len(signals), 0, words, stated)
     names, units, contradictions = names_of(layout)
     note = f"{path.stem}: its table lies on its side and was turned: each of its {len(signals)} long lines is a column."
     return Columns(
@@ -83,12 +80,3 @@ def _columns(path: Path, signals: Sequence[Signal], separator: str) -> Columns |
         numbered=not named,
         contradictions=contradictions,
     )
-
-
-def _words(signals: Sequence[Signal]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return tuple(one.name for one in signals), tuple(one.unit for one in signals)
-
-
-def _array(texts: Sequence[str], decimal: str) -> np.ndarray:
-    plain = [text.replace(decimal, ".") if decimal != "." else text for text in texts]
-    return np.array([np.nan if text in NOTHING else float(text) for text in plain])

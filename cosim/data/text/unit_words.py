@@ -10,39 +10,32 @@ from functools import lru_cache
 from cosim.support.errors import UnitError
 from cosim.support.units import unit
 
-WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sek": "s", "sekunde": "s", "sekunden": "s",
-    "msec": "ms", "msecs": "ms", "msek": "ms", "millisecond": "ms", "milliseconds": "ms", "millis": "ms",
-    "millisec": "ms", "millisekunden": "ms",
-    "usec": "us", "usecs": "us", "microsecond": "us", "microseconds": "us", "micros": "us", "microsec": "us",
-    "nsec": "ns", "nsecs": "ns", "nanosecond": "ns", "nanoseconds": "ns", "nanosec": "ns", "nanos": "ns",
-    "minute": "min", "minutes": "min", "hour": "h", "hours": "h", "hrs": "h",
-    "degree": "deg", "degrees": "deg", "degs": "deg", "grad": "deg", "gon": "0.9 deg",
-    "mdeg": "0.001 deg", "millideg": "0.001 deg", "millidegree": "0.001 deg", "millidegrees": "0.001 deg",
-    "udeg": "1e-06 deg", "mgrad": "0.001 deg", "milligrad": "0.001 deg",
-    "radian": "rad", "radians": "rad", "rads": "rad", "milliradian": "mrad", "milliradians": "mrad",
-    "microrad": "urad", "microradian": "urad", "microradians": "urad",
-    "\N{PRIME}": "arcmin", "'": "arcmin", "\N{DOUBLE PRIME}": "arcsec", '"': "arcsec",
-    "arc-sec": "arcsec", "arcsecond": "arcsec", "arcseconds": "arcsec", "arcsecs": "arcsec", "arc-min": "arcmin",
-    "arcminute": "arcmin", "arcminutes": "arcmin",
-    "revs": "rev", "revolution": "rev", "revolutions": "rev", "turns": "turn", "rotation": "rev", "rotations": "rev",
-    "rot": "rev", "umdrehung": "rev", "umdrehungen": "rev", "umdr": "rev",
-    "dps": "deg/s", "mdps": "0.001 deg/s", "rps": "rev/s", "degps": "deg/s", "radps": "rad/s", "r.p.m.": "rpm",
-    "mps": "m/s", "mmps": "mm/s",
-    "n-m": "N.m", "nm": "N.m", "mnm": "mN.m", "n m": "N.m", "newton": "N", "newtons": "N",
-    "newton-meter": "N.m", "newton-metre": "N.m", "newtonmeter": "N.m", "newton meter": "N.m", "newton metre": "N.m",
-    "newton-meters": "N.m", "newton-metres": "N.m", "newton meters": "N.m", "newton metres": "N.m",
-    "mnewtonmeter": "mN.m", "millinewtonmeter": "mN.m", "millinewton-meter": "mN.m", "newton-mm": "mN.m",
-    "millimeter": "mm", "millimetre": "mm", "millimeters": "mm", "millimetres": "mm", "meter": "m", "metre": "m",
-    "meters": "m", "metres": "m", "micron": "um", "microns": "um", "micrometer": "um", "micrometers": "um",
-    "amp": "A", "amps": "A", "ampere": "A", "milliamp": "mA", "milliamps": "mA", "volt": "V", "volts": "V",
-    "celsius": "degC", "degc": "degC", "c": "degC", "kelvin": "K",
-    "percent": "%", "permille": "0.1 %", "\N{PER MILLE SIGN}": "0.1 %",
-    "inc": "count", "incs": "count", "increment": "count", "increments": "count", "ticks": "count", "pulses": "count",
-    "cnt": "count", "cnts": "count",
-    "hz": "Hz", "day": "24 h", "days": "24 h", "inch": "2.54 cm", "inches": "2.54 cm",
+SPELLINGS = {
+    "s": "sec, secs, second, seconds, sek, sekunde, sekunden",
+    "ms": "msec, msecs, msek, millisecond, milliseconds, millis, millisec, millisekunden",
+    "us": "usec, usecs, microsecond, microseconds, micros, microsec",
+    "ns": "nsec, nsecs, nanosecond, nanoseconds, nanosec, nanos", "min": "minute, minutes", "h": "hour, hours, hrs",
+    "deg": "degree, degrees, degs, grad", "0.9 deg": "gon",
+    "0.001 deg": "mdeg, millideg, millidegree, millidegrees, mgrad, milligrad", "1e-06 deg": "udeg",
+    "rad": "radian, radians, rads", "mrad": "milliradian, milliradians", "urad": "microrad, microradian, microradians",
+    "arcmin": "\N{PRIME}, ', arc-min, arcminute, arcminutes",
+    "arcsec": '\N{DOUBLE PRIME}, ", arc-sec, arcsecond, arcseconds, arcsecs',
+    "rev": "revs, revolution, revolutions, rotation, rotations, rot, umdrehung, umdrehungen, umdr", "turn": "turns",
+    "deg/s": "dps, degps", "0.001 deg/s": "mdps", "rev/s": "rps", "rad/s": "radps", "rpm": "r.p.m.", "m/s": "mps",
+    "mm/s": "mmps",
+    "N.m": (
+        "n-m, nm, n m, newton-meter, newton-metre, newtonmeter, newton meter, newton metre, "
+        "newton-meters, newton-metres, newton meters, newton metres"
+    ),
+    "mN.m": "mnm, mnewtonmeter, millinewtonmeter, millinewton-meter, newton-mm", "N": "newton, newtons",
+    "mm": "millimeter, millimetre, millimeters, millimetres", "m": "meter, metre, meters, metres",
+    "um": "micron, microns, micrometer, micrometers", "A": "amp, amps, ampere", "mA": "milliamp, milliamps",
+    "V": "volt, volts", "degC": "celsius, degc, c", "K": "kelvin", "%": "percent",
+    "0.1 %": "permille, \N{PER MILLE SIGN}", "count": "inc, incs, increment, increments, ticks, pulses, cnt, cnts",
+    "Hz": "hz", "24 h": "day, days", "2.54 cm": "inch, inches",
 }  # fmt: skip
-"""Units as tools write them in words, in small letters, and how they are written here."""
+"""Units as they are written here, and how tools write them in words, in small letters."""
+WORDS = {word: name for name, words in SPELLINGS.items() for word in words.split(", ")}
 OUNCE, POUND, KILOPOND = 0.27801385095, 4.4482216153, 9.80665
 """Forces of the units that weigh [N]: ounce, pound and kilogram on Earth."""
 FOOT, INCH, CENTIMETRE = 0.3048, 0.0254, 0.01
