@@ -187,9 +187,10 @@ def recorded(seconds: float, drag: float, seed: int) -> pd.DataFrame:
 
 
 def test_a_diagnosis_of_data_frames_answers_in_python_and_in_a_notebook(card: Path, line: list[str]) -> None:
-    train, heldout = [recorded(30, 4.0, seed) for seed in (1, 2)], recorded(30, 4.0, 3)
     told: list[tuple[str, ...]] = []
-    answer = cosim.diagnose(train, heldout, card, on_answer=lambda found: told.append(found.verdict))
+    runs = [recorded(30, 4.0, seed) for seed in (1, 2, 3)]  # the last one is kept for validation
+    answer = cosim.diagnose(runs, card=card, on_answer=lambda found: told.append(found.verdict))
+    assert answer.diagnosis.heldout.name == "train 3"
     assert answer.missing == ("quadratic_drag",)
     assert told == [answer.missing]
     assert [effect.id for effect in answer.card.effects] == ["quadratic_drag"]
@@ -277,7 +278,7 @@ def test_a_diagnosis_is_one_line_tables_and_a_figure(card: Path, tmp_path: Path)
 
 
 def test_an_identification_and_a_run_are_one_line_a_table_and_a_figure(recording: Recording, card: Path) -> None:
-    found = cosim.identify(recording, card)
+    found = cosim.identify(recording.table, card)
     table = found.frame().set_index("parameter")
     assert table.loc["friction.Fc", "value"] == pytest.approx(2.4, rel=0.1)
     assert table.loc["friction.Fc", "given"] == 2.0

@@ -20,14 +20,11 @@ from cosim.system.diagram import origin
 from cosim.system.sections import ComponentSection
 
 
-def waves(t: np.ndarray) -> np.ndarray:
-    return np.sin(1.3 * t) + 0.4 * np.sin(3.1 * t + 1)
-
-
 def table(rate: float, seconds: float = 20.0, start: float = 0.0, moved: float = 0.0, extra: float = 0.0) -> Any:
     """A motion sampled at a rate from a start on; `moved` is what its clock is behind, `extra` a torque on top."""
     t = start + np.arange(round(seconds * rate)) / rate
-    return pd.DataFrame({"t": t - moved, "q": waves(t), "tau": 2 * np.cos(t) + extra})
+    q = np.sin(1.3 * t) + 0.4 * np.sin(3.1 * t + 1)
+    return pd.DataFrame({"t": t - moved, "q": q, "tau": 2 * np.cos(t) + extra})
 
 
 def test_other_rates_and_spans_are_compared_on_the_rows_of_the_first() -> None:

@@ -90,12 +90,6 @@ def begun(home: Path, **environment: str) -> tuple["subprocess.Popen[str]", str]
     return process, process.stdout.readline().strip()
 
 
-def children(pid: int) -> list[int]:
-    """The processes that a process has, over all threads."""
-    found = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(one) for path in found for one in path.read_text().split()]
-
-
 def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
@@ -118,7 +112,8 @@ def test_a_server_takes_its_processes_with_it(tmp_path: Path, sign: str, code: i
     try:
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{30,}", address)
         assert httpx2.get(address, follow_redirects=True).status_code == 200
-        own = children(process.pid)
+        threads = Path(f"/proc/{process.pid}/task").glob("*/children")
+        own = [int(one) for path in threads for one in path.read_text().split()]
         assert own
         process.send_signal(getattr(signal, sign))
         process.wait(10)

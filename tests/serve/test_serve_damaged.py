@@ -19,10 +19,6 @@ def note(desk: Desk, job: str) -> Path:
     return desk.store.home / id_of(job) / "job.json"
 
 
-def altered(desk: Desk, job: str, **values: Any) -> bytes:
-    return json.dumps(json.loads(note(desk, job).read_text("utf-8")) | values).encode()
-
-
 ABSURD: dict[str, Any] = {
     "state of a later version": {"state": "archived"},
     "key of a later version": {"priority": 1},
@@ -61,7 +57,9 @@ TEXTS = {
 @pytest.mark.parametrize("text", [*ABSURD, *TEXTS])
 def test_a_job_that_cannot_be_read_costs_itself_alone_and_is_removed(client: TestClient, desk: Desk, text: str) -> None:
     other, job = new(client), new(client)
-    note(desk, job).write_bytes(TEXTS[text] if text in TEXTS else altered(desk, job, **ABSURD[text]))
+    path = note(desk, job)
+    altered = json.loads(path.read_text("utf-8")) | ABSURD.get(text, {})
+    path.write_bytes(TEXTS.get(text, json.dumps(altered).encode()))
     home = client.get("/")
     assert home.status_code == 200
     assert "Unreadable diagnosis" in home.text
@@ -76,7 +74,7 @@ def test_a_job_that_cannot_be_read_costs_itself_alone_and_is_removed(client: Tes
         assert [one.id for one in again.store.all()] == [id_of(other)]
     assert act(client, job, "remove").status_code == 200
     assert "Unreadable" not in client.get("/").text
-    assert not note(desk, job).parent.exists()
+    assert not path.parent.exists()
 
 
 @pytest.mark.parametrize(

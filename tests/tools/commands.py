@@ -38,14 +38,16 @@ def call(*arguments: object) -> int:
 
 @pytest.fixture
 def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
-    """A command that is refused: call it with its words; what it says."""
+    """A command that is refused, without a word on stdout: call it with its words; what it says."""
 
-    def said(*words: object) -> str:
+    def asked(*words: object) -> str:
         capsys.readouterr()
         assert call(*words) == 2
-        return capsys.readouterr().err
+        said = capsys.readouterr()
+        assert said.out == ""
+        return said.err
 
-    return said
+    return asked
 
 
 def python(*words: str, folder: Path | None = None, **more: str) -> "subprocess.CompletedProcess[str]":

@@ -77,11 +77,11 @@ def state_of(desk: Desk, job: str) -> Job:
     return desk.store.get(id_of(job))
 
 
-def done(client: TestClient, desk: Desk, job: str, ends: str = "done") -> str:
+def done(client: TestClient, desk: Desk, job: str) -> str:
     """The id of a job after its diagnosis."""
     act(client, job, "start")
     until(lambda: not state_of(desk, job).live)
-    assert state_of(desk, job).state == ends
+    assert state_of(desk, job).state == "done"
     return id_of(job)
 
 
