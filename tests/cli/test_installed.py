@@ -1,6 +1,7 @@
 """What is installed: versions, extras, verbs and readers of other distributions; and none of it is loaded unasked."""
 
 import json
+import os
 from importlib import metadata
 from importlib.resources import files
 from math import pi
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import call, python
+from commands import ENVIRONMENT, call, python
 from imports import PLUG_INS
 
 from cosim.api import doctor as looked
@@ -65,7 +66,7 @@ def site(tmp_path: Path) -> Path:
 
 def mine(site: Path, *words: str) -> tuple[int, str, str]:
     """What Python does where the distribution is: its exit code and what it says on both."""
-    done = python(*words, folder=site, PYTHONPATH=str(site))
+    done = python(*words, folder=site, PYTHONPATH=os.pathsep.join([str(site), ENVIRONMENT["PYTHONPATH"]]))
     return done.returncode, done.stdout, done.stderr
 
 
