@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.evidence.forms import forms
+from cosim.diagnosis.evidence.discrepancy import forms
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
@@ -28,9 +28,7 @@ KNOT = 1.0
 
 def share_left(comparison: Comparison, found: Fit) -> float:
     """Slow part of what a structure leaves of the training recordings."""
-    prepared = comparison.problem.prepared
-    clear = comparison.problem.weight * far_from_turns(prepared)
-    return _slow(found.residual, clear, prepared) / _friction(comparison, clear)
+    return _slow(found.residual, _clear(comparison), comparison.problem.prepared) / friction_level(comparison)
 
 
 def share_there(comparison: Comparison, found: Fit, residual: Array, held: Predictive) -> float:
@@ -39,9 +37,8 @@ def share_there(comparison: Comparison, found: Fit, residual: Array, held: Predi
     Beside what its numbers may be otherwise there: a base that training hardly tells foretells other speeds badly, and
     nothing is missing for that. They move as far as cells say that are as uncertain as those of training are wrong.
     """
-    clear = comparison.problem.weight * far_from_turns(comparison.problem.prepared)
-    friction, clear_there = _friction(comparison, clear), _clear_there(comparison, held)
-    wrong = max(_slow(found.residual, clear, comparison.problem.prepared), LEAST_WRONG * friction)
+    friction, clear_there = friction_level(comparison), _clear_there(comparison, held)
+    wrong = max(_slow(found.residual, _clear(comparison), comparison.problem.prepared), LEAST_WRONG * friction)
     left = residual - _moved(residual, held.moved(found), clear_there, held.prepared, wrong)
     return _slow(left, clear_there, held.prepared) / friction
 
@@ -65,12 +62,10 @@ def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held
     equations of the named effects may miss of their machine's.
     """
     prepared, here, there = comparison.problem.prepared, comparison.nuisances.columns, held.nuisances.columns
-    trained, clear_there = comparison.problem.weight * far_from_turns(prepared), _clear_there(comparison, held)
-    friction = _friction(comparison, trained)
-    sizes = []
+    friction, sizes = friction_level(comparison), []
     for residual, weight, rows, nuisances in (
-        (found.residual, trained, prepared, here),
-        (residual_there, clear_there, held.prepared, there),
+        (found.residual, _clear(comparison), prepared, here),
+        (residual_there, _clear_there(comparison, held), held.prepared, there),
     ):
         missed = forms(found, len(comparison.problem.mount.effects), rows)
         if missed:
@@ -83,7 +78,7 @@ def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held
 def over_time(comparison: Comparison, found: Fit) -> str:
     """Which explains more: a torque that is free over time, or a friction level that is."""
     prepared, level = comparison.problem.prepared, comparison.nuisances.level
-    clear = comparison.problem.weight * far_from_turns(prepared)
+    clear = _clear(comparison)
     rest, left, first = found.residual * clear, {"time": 0.0, "friction level over time": 0.0}, 0
     for piece in prepared.pieces:
         rows = slice(first, first + len(piece.kept))
@@ -91,6 +86,11 @@ def over_time(comparison: Comparison, found: Fit) -> str:
         for name, factor in zip(left, (np.abs(level), level), strict=True):
             left[name] += float(np.sum(projected(rest[rows], hats * (clear * factor)[rows, None]) ** 2))
     return min(left, key=lambda name: left[name])
+
+
+def _clear(comparison: Comparison) -> Array:
+    """Rows of clear motion away from turns in training."""
+    return np.asarray(comparison.problem.weight * far_from_turns(comparison.problem.prepared))
 
 
 def _clear_there(comparison: Comparison, held: Predictive) -> Array:
@@ -104,12 +104,7 @@ def _clear_there(comparison: Comparison, held: Predictive) -> Array:
 
 def friction_level(comparison: Comparison) -> float:
     """RMS of the friction torque in clear motion away from turns."""
-    return _friction(comparison, comparison.problem.weight * far_from_turns(comparison.problem.prepared))
-
-
-def _friction(comparison: Comparison, clear: Array) -> float:
-    """RMS of the friction torque in clear motion."""
-    tau = comparison.problem.prepared.stacked("tau")
+    clear, tau = _clear(comparison), comparison.problem.prepared.stacked("tau")
     level, torque = (_rms(one, clear) for one in (comparison.nuisances.level, tau))
     return max(level, LEAST_FRICTION * torque, 1e-300)
 

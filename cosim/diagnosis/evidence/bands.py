@@ -15,6 +15,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.evidence.discrepancy import Discrepancy
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
@@ -125,6 +126,27 @@ class Bands:
     def crossed(self, one: Array, other: Array) -> Array:
         """Products of two sets of columns in each band, (bands, n, m)."""
         return np.array([one[rows].T @ other[rows] for rows in self._order])
+
+
+class OnBands:
+    """What is compared on bands beside nuisances: these transformed, once."""
+
+    bands: Bands
+    nuisances: Discrepancy
+
+    @cached_property
+    def _nuisances(self) -> Array:
+        return self.bands.transform(self.nuisances.columns)
+
+    @cached_property
+    def _nuisance_grams(self) -> Array:
+        return self.bands.grams(self._nuisances)
+
+
+def joined(first: Array, cross: Array, last: Array) -> Array:
+    """Gram matrices of two sets of columns together, from those of each and the products of the two."""
+    upper = np.concatenate([first, cross], axis=2)
+    return np.concatenate([upper, np.concatenate([np.swapaxes(cross, 1, 2), last], axis=2)], axis=1)
 
 
 def passed(hertz: Array, cutoff: float) -> Array:

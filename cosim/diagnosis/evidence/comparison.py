@@ -17,9 +17,8 @@ from cosim.diagnosis.answer.ledger import Gain, Key, Ledger, Rule, Trial, error_
 from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import candidates, named
 from cosim.diagnosis.effects.candidates import Candidate, columns_of
-from cosim.diagnosis.evidence.bands import Bands, NoiseOverSpeed, noise_over_speed
-from cosim.diagnosis.evidence.discrepancy import Discrepancy, Shapes, discrepancy
-from cosim.diagnosis.evidence.forms import Forms, forms
+from cosim.diagnosis.evidence.bands import Bands, NoiseOverSpeed, OnBands, joined, noise_over_speed
+from cosim.diagnosis.evidence.discrepancy import Discrepancy, Forms, discrepancy, forms
 from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
 from cosim.diagnosis.evidence.structure import Structure, key_of, structure_of
 from cosim.estimation.blocks import Blocks
@@ -59,7 +58,7 @@ class Screened:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(OnBands):
     """What all comparisons of a diagnosis share."""
 
     problem: Problem
@@ -102,14 +101,6 @@ class Comparison:
         inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
         floor = bands.least_noise(prepared, inertia, policy)
         return cls(problem, policy, bands, nuisances, floor, noise, inertia, base.free, {base: offered}, base)
-
-    @cached_property
-    def _nuisances(self) -> Array:
-        return self.bands.transform(self.nuisances.columns)
-
-    @cached_property
-    def _nuisance_grams(self) -> Array:
-        return self.bands.grams(self._nuisances)
 
     @cached_property
     def _evidence(self) -> WeakKeyDictionary[Fit, dict[tuple[Aside, bool, Forms | None], float]]:
@@ -230,24 +221,15 @@ class Comparison:
 
     def _joined(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
         """Gram matrices of own columns and the nuisances that stay, and where those are among the columns."""
-        groups, kept = self._staying(aside)
-        first = own.shape[1]
-        size = first + len(kept)
-        grams = np.empty((len(self.bands.count), size, size))
-        grams[:, :first, :first] = self.bands.grams(own)
+        kept, first = self._staying(aside), own.shape[1] - 1
         cross = self.bands.crossed(own, self._nuisances[:, kept])
-        grams[:, :first, first:], grams[:, first:, :first] = cross, np.swapaxes(cross, 1, 2)
-        grams[:, first:, first:] = self._nuisance_grams[:, kept][:, :, kept]
-        fast, start = np.arange(len(found.free), first - 1), first - 1
+        grams = joined(self.bands.grams(own), cross, self._nuisance_grams[:, kept][:, :, kept])
+        fast = np.arange(len(found.free), first)
         placed = [Group(fast, self.policy.wander)] if fast.size else []
-        for group in groups:
-            placed.append(Group(np.arange(start, start + len(group.columns)), group.prior))
-            start += len(group.columns)
-        return grams, placed
+        return grams, [*placed, *self.nuisances.groups_at(first, aside)]
 
-    def _staying(self, aside: Aside) -> tuple[list[Shapes], list[int]]:
-        groups = [group for group in self.nuisances.groups if group.name not in aside]
-        return groups, [k for group in groups for k in group.columns]
+    def _staying(self, aside: Aside) -> list[int]:
+        return [k for group in self.nuisances.groups if group.name not in aside for k in group.columns]
 
     def screen(self, found: Fit) -> list[Screened]:
         """Score every candidate beside a fitted structure."""
@@ -324,14 +306,9 @@ class Comparison:
         return {group.name: float(size) for group, size in zip(groups, sizes[-len(groups) :], strict=True)}
 
     def _grown(self, grams: Array, own: Array, aside: Aside, added: Array) -> Array:
-        kept = self._staying(aside)[1]
-        size, more = grams.shape[1], added.shape[1]
-        out = np.empty((len(grams), size + more, size + more))
-        out[:, :size, :size] = grams
-        cross = np.concatenate([self.bands.crossed(own, added), self.bands.crossed(self._nuisances[:, kept], added)], 1)
-        out[:, :size, size:], out[:, size:, :size] = cross, np.swapaxes(cross, 1, 2)
-        out[:, size:, size:] = self.bands.grams(added)
-        return out
+        nuisances = self._nuisances[:, self._staying(aside)]
+        cross = np.concatenate([self.bands.crossed(own, added), self.bands.crossed(nuisances, added)], 1)
+        return joined(grams, cross, self.bands.grams(added))
 
 
 class _Offered(NamedTuple):

@@ -17,10 +17,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from cosim.diagnosis.decide.policy import Policy
-from cosim.diagnosis.evidence.bands import Bands, reading_torque
+from cosim.diagnosis.evidence.bands import Bands, OnBands, joined, reading_torque
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.discrepancy import Discrepancy, Shapes, discrepancy
-from cosim.diagnosis.evidence.marginal import Group, marginal
+from cosim.diagnosis.evidence.marginal import marginal
 from cosim.diagnosis.evidence.structure import Structure, structure_of
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
@@ -52,7 +52,7 @@ class Weighed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Predictive:
+class Predictive(OnBands):
     """Held-out recordings, prepared in the band of the analysis, and how they are weighed."""
 
     prepared: Prepared
@@ -135,16 +135,9 @@ class Predictive:
         columns = np.column_stack([residual, open_])
         target = self.bands.transform(columns)
         cross = self.bands.crossed(target, self._nuisances)
-        grams = np.concatenate(
-            [
-                np.concatenate([self.bands.grams(target), cross], axis=2),
-                np.concatenate([np.swapaxes(cross, 1, 2), self._nuisance_grams], axis=2),
-            ],
-            axis=1,
-        )
+        grams = joined(self.bands.grams(target), cross, self._nuisance_grams)
         first = columns.shape[1] - 1
-        groups = [Group(first + np.array(group.columns), group.prior) for group in self.nuisances.groups]
-        free = np.ones(grams.shape[1] - 1)
+        groups, free = self.nuisances.groups_at(first), np.ones(grams.shape[1] - 1)
         found = marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor)
         left = target[:, 0] - target[:, 1:] @ found.beta[:first] - self._nuisances @ found.beta[first:]
         by_block = self.bands.energy_by_block(left, found.noise, Blocks.of(self.prepared))
@@ -164,7 +157,10 @@ class Predictive:
             _beyond(float(np.mean((self.weight * self.residual(one)) ** 2)), share * reading_noise(self.prepared, one))
             for one in (without, mount)
         ]
-        wide = [_beyond(self._protocol_energy(one), reading_noise(self.protocol, one)) for one in (without, mount)]
+        wide = [
+            _beyond(float(np.mean(inside(self.protocol, one) ** 2)), reading_noise(self.protocol, one))
+            for one in (without, mount)
+        ]
         amplified = wide[1] > AMPLIFIED * wide[0] and narrow[1] > (1 - self.halved) * narrow[0]
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
@@ -182,17 +178,6 @@ class Predictive:
         if not gets_memory(mount, without) or self.weight.all():
             return 0.0
         return removed_at_rest(self.weight, self.residual(mount), self.residual(without))
-
-    def _protocol_energy(self, mount: Mount) -> float:
-        return float(np.mean(inside(self.protocol, mount) ** 2))
-
-    @cached_property
-    def _nuisances(self) -> Array:
-        return self.bands.transform(self.nuisances.columns)
-
-    @cached_property
-    def _nuisance_grams(self) -> Array:
-        return self.bands.grams(self._nuisances)
 
 
 def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -> Discrepancy:

@@ -118,14 +118,9 @@ class Concealment:
 
     def _base(self, effect: str) -> tuple[Any, list[Group]]:
         """Numbers of residual, tangents and the nuisances that stay beside an effect, and the groups of the latter."""
-        aside = aside_for(effect)
-        staying = [group for group in self._comparison.nuisances.groups if group.name not in aside]
-        kept = [self._own + column for group in staying for column in group.columns]
-        edges = self._own - 1 + np.cumsum([0, *(len(group.columns) for group in staying)])
-        groups = [
-            Group(np.arange(first, last), group.prior)
-            for first, last, group in zip(edges, edges[1:], staying, strict=False)
-        ]
+        aside, nuisances = aside_for(effect), self._comparison.nuisances
+        kept = [self._own + k for group in nuisances.groups if group.name not in aside for k in group.columns]
+        groups = nuisances.groups_at(self._own - 1, aside)
         return np.array([*range(self._own), *kept]), groups
 
     def _start(self, effect: str, base: Any, groups: list[Group]) -> Marginal:

@@ -17,7 +17,7 @@ from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.effects.candidates import at_own_level
-from cosim.diagnosis.evidence.broadband import Shaken
+from cosim.diagnosis.evidence.shaking import Shaken
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.admissibility import Numbers, numbers_of
 from cosim.diagnosis.search.candidate_fit import CandidateFit, is_renamed

@@ -18,7 +18,7 @@ import numpy as np
 from cosim.diagnosis.effects import candidates
 from cosim.diagnosis.effects.candidates import Candidate, columns_of
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.evidence.marginal import Group, marginal
+from cosim.diagnosis.evidence.marginal import marginal
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.priors import trust
@@ -73,7 +73,7 @@ class Scores:
     def _noise(comparison: Comparison, base: Fit, transformed: Array) -> tuple[Array, Array]:
         """Weight of each band's rows, and standard deviations of what is known, as the evidence has them."""
         bands, many = comparison.bands, base.slopes.shape[1]
-        groups = [Group(many + np.array(one.columns), one.prior) for one in comparison.nuisances.groups]
+        groups = comparison.nuisances.groups_at(many)
         free = np.ones(transformed.shape[1] - 1)
         free[: len(base.free)] = trust(base, comparison.problem.prepared.reach)
         now = marginal(bands.grams(transformed), free, groups, bands.count, bands.effective, comparison.floor)

@@ -15,10 +15,9 @@ from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, 
 from cosim.diagnosis.decide.calibration import LIKELY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.adequacy import friction_level, over_time, share_beside, share_left, share_there
-from cosim.diagnosis.evidence.broadband import Shaken, shaken
-from cosim.diagnosis.evidence.bursts import burst_share
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.evidence.shaking import Shaken, burst_share, shaken
 from cosim.diagnosis.evidence.structure import structure_of
 from cosim.diagnosis.search.nameless import Nameless
 from cosim.diagnosis.search.rivals import explains, margins, waves

@@ -5,7 +5,7 @@ clocks as well, and the equation that is fitted is the one that is delivered. Si
 a coefficient of wave k has a prior of 1/k beside the size of its term, that of a random walk over the range.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from math import pi
@@ -109,7 +109,10 @@ def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     if rubs:
         yield _term("speed", LearnedFriction, _falling(WAVES, 0), over="speed", seen=v)
         yield _term("time since reversal", LearnedAfterReversal, [1.0] * len(TIMES), times=TIMES, creep=CREEP * top)
-        yield from _of_followed(prepared)
+        level = _falling(WAVES, 0)
+        way, a = ranges_of("way", prepared), ranges_of("acceleration", prepared)  # what a state follows
+        yield _term("way travelled", LearnedFriction, _falling(OVER_WAY, 0), over="way", seen=way)
+        yield _term("speed and acceleration", LearnedViscous, level, over="acceleration", seen=a, at_speed=top)
     if not prepared.has_position:
         return
     yield _term("position", LearnedTorque, _falling(WAVES), over="position", seen=q)
@@ -122,20 +125,10 @@ def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     else:
         yield _term("torque and position", LearnedGain, _falling(FINE, 0), over="position", seen=q)
     if rubs:
-        level = _falling(WAVES, 0)
         yield _term("speed and position", LearnedViscous, level, over="position", seen=q, at_speed=top)
         yield _term(LEVEL, LearnedFriction, level, over="position", seen=q)
         after = {"ways": ways, "creep": CREEP * top}
         yield _term("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
-
-
-def _of_followed(prepared: Prepared) -> Iterator[CandidateTerm]:
-    """What a state follows: the way travelled, and acceleration, which changes the drag."""
-    way, a = ranges_of("way", prepared), ranges_of("acceleration", prepared)
-    yield _term("way travelled", LearnedFriction, _falling(OVER_WAY, 0), over="way", seen=way)
-    fast = max(map(abs, prepared.ranges["v"]))
-    drag = _falling(WAVES, 0)
-    yield _term("speed and acceleration", LearnedViscous, drag, over="acceleration", seen=a, at_speed=fast)
 
 
 def ranges_of(name: str, prepared: Prepared) -> tuple[float, float]:
@@ -160,7 +153,10 @@ def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
             yield _term(f"speed and {name}", LearnedViscous, _falling(few, 0), over=over, seen=seen, at_speed=top)
             if prepared.has_position:
                 waves = FEW, resolved(FEW // 2, whole)
-                yield _of_products(name, {"by": over, "by_seen": seen, "waves": waves}, prepared)
+                sizes = [a * b for a, b in product(_falling(FEW), _falling(waves[1]))]
+                shape = {"over": "position", "seen": prepared.ranges["q"], "by": over, "by_seen": seen, "waves": waves}
+                found = _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
+                yield replace(found, parts=(LEVEL, f"friction level over {name}"))
 
 
 def resolved(most: int, values: Array) -> int:
@@ -170,10 +166,3 @@ def resolved(most: int, values: Array) -> int:
     """
     gap = float(np.diff(np.sort(values)).max() / np.ptp(values))
     return max(1, min(most, int(1 / gap)))
-
-
-def _of_products(name: str, by: Mapping[str, Any], prepared: Prepared) -> CandidateTerm:
-    sizes = [a * b for a, b in product(_falling(FEW), _falling(by["waves"][1]))]
-    shape = {"over": "position", "seen": prepared.ranges["q"], **by}
-    found = _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
-    return replace(found, parts=(LEVEL, f"friction level over {name}"))

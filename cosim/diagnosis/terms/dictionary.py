@@ -7,7 +7,6 @@ they are followed along the motion, as the plant's own states do (`learned_base.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -92,12 +91,12 @@ def _needed(prepared: Prepared) -> Column:
 
 def _of_time(prepared: Prepared) -> dict[str, Maker]:
     sign = _sign(prepared)
-    return {
-        "time since the start": lambda p: _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4),
-        "friction level over time since the start": lambda p: [
-            wave * sign(p) for wave in _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4)
-        ],
-    }
+
+    def waves(p: Piece) -> list[Array]:
+        return _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4)
+
+    by_level = {"friction level over time since the start": lambda p: [wave * sign(p) for wave in waves(p)]}
+    return {"time since the start": waves, **by_level}
 
 
 def _of_reversals(prepared: Prepared) -> dict[str, Maker]:
@@ -123,23 +122,25 @@ def _of_reversals(prepared: Prepared) -> dict[str, Maker]:
 def _of_columns(prepared: Prepared) -> dict[str, Maker]:
     """User columns, offered as causes: alone, as a friction level, and with the speed."""
     sign = _sign(prepared)
-    return {name: partial(_by_column, column, sign) for name, column in user_columns(prepared).items()}
 
+    def by(column: Column) -> Maker:
+        return lambda p: [column(p), column(p) * sign(p), column(p) * p.v]
 
-def _by_column(column: Column, sign: Column, p: Piece) -> list[Array]:
-    return [column(p), column(p) * sign(p), column(p) * p.v]
+    return {name: by(column) for name, column in user_columns(prepared).items()}
 
 
 def _products(prepared: Prepared) -> dict[str, Maker]:
     """Products of position and user columns, without what goes with either of the two alone."""
     sign, place = _sign(prepared), _place(prepared)
-    columns = user_columns(prepared).items()
-    return {f"position and {name}": partial(_product, place, column, sign) for name, column in columns}
 
+    def by(other: Column) -> Maker:
+        def make(p: Piece) -> list[Array]:
+            own = [wave * other(p) for wave in _waves(place(p), FEW)]
+            return [*own, *(wave * sign(p) for wave in own)]
 
-def _product(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    waves = _waves(place(p), FEW)
-    return [*(wave * other(p) for wave in waves), *(wave * other(p) * sign(p) for wave in waves)]
+        return make
+
+    return {f"position and {name}": by(column) for name, column in user_columns(prepared).items()}
 
 
 class FurtherColumns(NamedTuple):
@@ -152,7 +153,13 @@ class FurtherColumns(NamedTuple):
 
 def further_columns(prepared: Prepared) -> FurtherColumns:
     """Part the columns that vary and are no plain copy of the motion."""
-    useful = _useful(prepared)
+    common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
+    useful: dict[str, Array] = {}
+    for name in sorted(common):
+        whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
+        if np.ptp(whole) > ROUNDING * np.abs(whole).max():  # what only changes later foretells nothing
+            column = np.concatenate([piece.lowpass(piece.extras[name])[piece.kept] for piece in prepared.pieces])
+            useful |= {} if _repeats(prepared, column) else {name: column}
     torque = own_torque(prepared, useful)
     rest = {name: column for name, column in useful.items() if name not in torque}
     set_point = own_set_point(prepared, rest)
@@ -161,24 +168,13 @@ def further_columns(prepared: Prepared) -> FurtherColumns:
 
 def user_columns(prepared: Prepared) -> dict[str, Column]:
     """Possible causes, centred, of unit size."""
-    return {name: _centred(prepared, name) for name in further_columns(prepared).causes}
 
+    def centred(name: str) -> Column:
+        whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
+        mean, size = float(whole.mean()), float(whole.std()) + 1e-300
+        return lambda p: np.asarray((p.extras[name] - mean) / size)
 
-def _useful(prepared: Prepared) -> dict[str, Array]:
-    """Columns that vary and are no plain copy, low-passed, at the kept rows."""
-    common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    made_of = {name: _at_rows(prepared, name) for name in sorted(common) if _varies(prepared, name)}
-    return {name: column for name, column in made_of.items() if not _repeats(prepared, column)}
-
-
-def _varies(prepared: Prepared, name: str) -> bool:
-    """Whether a column changes in training: what only changes later foretells nothing."""
-    whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
-    return bool(np.ptp(whole) > ROUNDING * np.abs(whole).max())
-
-
-def _at_rows(prepared: Prepared, name: str) -> Array:
-    return np.concatenate([piece.lowpass(piece.extras[name])[piece.kept] for piece in prepared.pieces])
+    return {name: centred(name) for name in further_columns(prepared).causes}
 
 
 def _repeats(prepared: Prepared, column: Array) -> bool:
@@ -190,12 +186,6 @@ def _repeats(prepared: Prepared, column: Array) -> bool:
     own = column - column.mean()
     left = own - known @ np.linalg.lstsq(known, own, rcond=1e-9)[0]
     return bool(left @ left <= POLICY.negligible * (own @ own))
-
-
-def _centred(prepared: Prepared, name: str) -> Column:
-    whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
-    mean, size = float(whole.mean()), float(whole.std()) + 1e-300
-    return lambda p: np.asarray((p.extras[name] - mean) / size)
 
 
 def _sign(prepared: Prepared) -> Column:

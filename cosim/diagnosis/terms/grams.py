@@ -27,10 +27,15 @@ SIZE = 0.5
 """What a term may be, relative to the friction level or to all torque where there is none (half-normal). Unit: 1."""
 
 
-def columns_of(mount: Mount, term: CandidateTerm, prepared: Prepared) -> Array:
-    """Torque that a unit of each coefficient adds at the kept rows, (rows, count), at the term's own coefficients."""
-    whole, names = with_terms(mount, [term])
-    inverse = Inverse(whole, names)
+def columns_of(mount: Mount, term: CandidateTerm, prepared: Prepared, beside: Sequence[CandidateTerm] = ()) -> Array:
+    """Torque that a unit of each coefficient adds at the kept rows, (rows, count), at the present coefficients.
+
+    `beside` are the terms that the mount has then, the term among them.
+    """
+    terms = beside or [term]
+    whole, names = with_terms(mount, terms)
+    first = sum(one.count for one in terms[: [one is term for one in terms].index(True)])
+    inverse = Inverse(whole, names[first : first + term.count])
     return stacked(inverse, prepared.pieces, inverse.present)[1]
 
 
@@ -138,7 +143,7 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
     edges = np.cumsum([0, *widths])
     own = [found.residual[:, None], found.slopes, comparison.nuisances.columns]
     parts, plain, count = _by_recording(comparison, [*own, *columns], [*(np.ones(one.shape[1]) for one in own), *unit])
-    groups = tuple(Group(np.asarray(g.columns) + edges[1], g.prior) for g in comparison.nuisances.groups)
+    groups = tuple(comparison.nuisances.groups_at(int(edges[1])))
     return Grams(
         parts,
         plain,

@@ -19,10 +19,9 @@ from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.terms.closed_form import ClosedForm, closed_form
 from cosim.diagnosis.terms.dictionary import OF_LAW
 from cosim.diagnosis.terms.grams import columns_of, grams_of
-from cosim.diagnosis.terms.partial import partial
+from cosim.diagnosis.terms.partial import needed, partial
 from cosim.diagnosis.terms.select import begun, fitted, paths, telling
 from cosim.estimation.fit import Fit
-from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.residuals import NO_BETTER, residuals
 from cosim.support.statistics import MIDDLE, rms
@@ -80,8 +79,7 @@ class Learned:
         old, new = (np.concatenate(_held_out(band, one)) for one in (without, self.mount))
         interval = interval_of(old, new, band.pieces[0].dt)
         helps = self.helps and interval[0] > 0
-        told = replace(self, before=rms(old), after=rms(new), interval=interval, cutoff=band.cutoff)
-        return replace(told, helps=helps)
+        return replace(self, before=rms(old), after=rms(new), interval=interval, cutoff=band.cutoff, helps=helps)
 
     def sentence(self) -> str:
         """Say it to a mechanic."""
@@ -192,13 +190,10 @@ def allowed(
 
 def _held_out(held: Prepared, mount: Mount) -> list[Array]:
     """What a model leaves of each held-out recording, by the protocol."""
-    pieces = held.pieces
-    left = [one[piece.inside] for one, piece in zip(residuals(held, mount), pieces, strict=True)]
-    owners = [piece.recording for piece in pieces]
-    return [
-        np.concatenate([one for one, own in zip(left, owners, strict=True) if own == number])
-        for number in sorted(set(owners))
-    ]
+    left: dict[int, list[Array]] = {number: [] for number in sorted({piece.recording for piece in held.pieces})}
+    for one, piece in zip(residuals(held, mount), held.pieces, strict=True):
+        left[piece.recording].append(one[piece.inside])
+    return [np.concatenate(parts) for parts in left.values()]
 
 
 def is_recorded(term: CandidateTerm, held: Predictive) -> bool:
@@ -208,10 +203,6 @@ def is_recorded(term: CandidateTerm, held: Predictive) -> bool:
 
 def _size(comparison: Comparison, learned: Learned) -> float:
     """Half the middle range of the torque that the terms add in training."""
-    prepared = comparison.problem.prepared
-    count = len(learned.mount.effects) - len(learned.effects)
-    plain = replace(learned.mount, effects=learned.mount.effects[:count])
-    with_it, without = (Inverse(mount, ()) for mount in (learned.mount, plain))
-    nothing = np.zeros(0)
-    parts = [(with_it.torque(p, nothing)[0] - without.torque(p, nothing)[0])[p.kept] for p in prepared.pieces]
-    return float(np.ptp(np.quantile(np.concatenate(parts), MIDDLE))) / 2
+    plain = replace(learned.mount, effects=learned.mount.effects[: -len(learned.effects)])
+    with_it, without = (needed(mount, comparison.problem.prepared) for mount in (learned.mount, plain))
+    return float(np.ptp(np.quantile(with_it - without, MIDDLE))) / 2

@@ -5,7 +5,6 @@
 f is the term's value, a torque or a relative change of the friction level; of the latter g is the friction itself.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -44,26 +43,16 @@ class Partial:
 
     def data(self) -> BinsEntry:
         """Return the mean of f over bins with its 95 % band; None where a bin holds too few rows."""
-        edges = [_edges(one, count) for one, count in zip(self._quantities(), self._bins(), strict=True)]
-        cell, shape = self._cells(edges)
-        mean, half = self._means(cell, int(np.prod(shape)))
-        value, band = (_listed(one.reshape(shape)) for one in (mean, half))
-        told: BinsEntry = {"at": _centres(edges[0]), "value": value, "band": band}
-        return told if self.by is None else {**told, "by_at": _centres(edges[1])}
-
-    def _quantities(self) -> tuple[Array, ...]:
-        return (self.over,) if self.by is None else (self.over, self.by)
-
-    def _bins(self) -> tuple[int, ...]:
-        return (BINS,) if self.by is None else COARSE
-
-    def _cells(self, edges: Sequence[Array]) -> tuple[Any, tuple[int, ...]]:
-        shape = tuple(len(one) - 1 for one in edges)
-        places = [
-            np.clip(np.searchsorted(edge, one, "right") - 1, 0, len(edge) - 2)
-            for one, edge in zip(self._quantities(), edges, strict=True)
-        ]
-        return np.ravel_multi_index(places, shape), shape
+        over = (self.over,) if self.by is None else (self.over, self.by)
+        counts = (BINS,) if self.by is None else COARSE
+        edges, places = [_edges(one, count) for one, count in zip(over, counts, strict=True)], []
+        for one, edge in zip(over, edges, strict=True):
+            places.append(np.clip(np.searchsorted(edge, one, "right") - 1, 0, len(edge) - 2))
+        mean, half = self._means(np.ravel_multi_index(places, counts), int(np.prod(counts)))
+        value, band = (_listed(one.reshape(counts)) for one in (mean, half))
+        at, *by_at = [((edge[1:] + edge[:-1]) / 2).tolist() for edge in edges]
+        told: BinsEntry = {"at": at, "value": value, "band": band}
+        return {**told, "by_at": by_at[0]} if by_at else told
 
     def _means(self, cell: Any, many: int) -> tuple[Array, Array]:
         """Weighted mean of each cell, and its half band from what blocks of rows differ by."""
@@ -103,10 +92,8 @@ def _quantity(name: str, mount: Mount, prepared: Prepared) -> Array:
 
     The command is that which the model needs: over the recorded one, which holds what is left, anything goes a little.
     """
-    return needed(mount, prepared) if name == "command" else _recorded(name, prepared)
-
-
-def _recorded(name: str, prepared: Prepared) -> Array:
+    if name == "command":
+        return needed(mount, prepared)
     own = {"position": "q", "speed": "v", "turn": "q"}
     if name in own:
         found = prepared.stacked(own[name])
@@ -119,10 +106,6 @@ def _recorded(name: str, prepared: Prepared) -> Array:
 def _edges(values: Array, count: int) -> Array:
     low, high = float(values.min()), float(values.max())
     return np.linspace(low, high if high > low else low + 1.0, count + 1)
-
-
-def _centres(edges: Array) -> list[Any]:
-    return [float(one) for one in (edges[1:] + edges[:-1]) / 2]
 
 
 def _listed(values: Array) -> list[Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm
-from cosim.diagnosis.terms.grams import Grams, grams_of, with_terms
+from cosim.diagnosis.terms.grams import Grams, columns_of, grams_of, with_terms
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
@@ -185,12 +185,14 @@ def _rising(term: CandidateTerm) -> CandidateTerm:
 
 def _step(comparison: Comparison, now: Fit, terms: tuple[CandidateTerm, ...]) -> tuple[Fit, tuple[CandidateTerm, ...]]:
     """One step: the target is what the base would leave without the terms."""
-    columns = [_columns_beside(now.mount, terms, k, comparison) for k in range(len(terms))]
+    columns = [columns_of(now.mount, one, comparison.problem.prepared, terms) for one in terms]
     old = np.concatenate([one.coefficients for one in terms])
     residual = now.residual + np.column_stack(columns) @ old if old.any() else now.residual
     grams = grams_of(comparison, replace(now, residual=residual), columns, terms)
     beta = grams.fitted(range(len(terms)), list(range(grams.recordings)))
-    values = np.clip(now.values + beta[: len(now.values)], *_edges(now.mount, now.free))
+    known = {variable.name: variable for variable in now.mount.parameters()}
+    edges = [[getattr(known[name], edge) for name in now.free] for edge in ("low", "high")]
+    values = np.clip(now.values + beta[: len(now.values)], *map(np.array, edges))
     new = _spread(beta[len(now.values) :] * grams.unit, terms)
     mount = with_values(now.mount, now.free, values)
     terms = tuple(one.with_coefficients(c.tolist()) for one, c in zip(terms, new, strict=True))
@@ -204,19 +206,6 @@ def _at(comparison: Comparison, now: Fit, mount: Mount, values: Array, terms: Se
     torque, slopes = stacked(Inverse(whole, now.free), prepared.pieces, values)
     left = prepared.stacked("tau") - torque
     return replace(now, mount=mount, values=values, torque=torque, slopes=slopes, residual=left)
-
-
-def _columns_beside(mount: Mount, terms: Sequence[CandidateTerm], which: int, comparison: Comparison) -> Array:
-    """Columns of one term beside the others."""
-    whole, names = with_terms(mount, terms)
-    first = sum(one.count for one in terms[:which])
-    inverse = Inverse(whole, names[first : first + terms[which].count])
-    return stacked(inverse, comparison.problem.prepared.pieces, inverse.present)[1]
-
-
-def _edges(mount: Mount, free: Sequence[str]) -> tuple[Array, Array]:
-    known = {variable.name: variable for variable in mount.parameters()}
-    return np.array([known[name].low for name in free]), np.array([known[name].high for name in free])
 
 
 def _spread(values: Array, terms: Sequence[CandidateTerm]) -> list[Array]:

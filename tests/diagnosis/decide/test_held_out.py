@@ -21,9 +21,9 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.effects.tuning import ANY
-from cosim.diagnosis.evidence.bursts import ABOVE, burst_share
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.evidence.shaking import ABOVE, burst_share
 from cosim.diagnosis.measure.protocol import of_the_best
 from cosim.diagnosis.search import rivals
 from cosim.diagnosis.search.candidate_fit import CandidateFit, weighed

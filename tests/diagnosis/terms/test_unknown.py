@@ -18,8 +18,8 @@ from cosim.diagnosis.decide.decision import Decision, decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
-from cosim.diagnosis.evidence.broadband import shaken
 from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.evidence.shaking import shaken
 from cosim.diagnosis.measure.flagged import Residual, flagged, loud_states, noise_at
 from cosim.diagnosis.search.scores import flexible_terms
 from cosim.estimation.discrepancy_basis import last_reversal
