@@ -157,10 +157,7 @@ class Predictive(OnBands):
             _beyond(float(np.mean((self.weight * self.residual(one)) ** 2)), share * reading_noise(self.prepared, one))
             for one in (without, mount)
         ]
-        wide = [
-            _beyond(float(np.mean(inside(self.protocol, one) ** 2)), reading_noise(self.protocol, one))
-            for one in (without, mount)
-        ]
+        wide = [_beyond(self._protocol_energy(one), reading_noise(self.protocol, one)) for one in (without, mount)]
         amplified = wide[1] > AMPLIFIED * wide[0] and narrow[1] > (1 - self.halved) * narrow[0]
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
@@ -178,6 +175,9 @@ class Predictive(OnBands):
         if not gets_memory(mount, without) or self.weight.all():
             return 0.0
         return removed_at_rest(self.weight, self.residual(mount), self.residual(without))
+
+    def _protocol_energy(self, mount: Mount) -> float:
+        return float(np.mean(inside(self.protocol, mount) ** 2))
 
 
 def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -> Discrepancy:

@@ -11,7 +11,7 @@ Findings of effects that are not named say so: not seen from which size, for wha
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import sqrt
+from math import log, sqrt
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from cosim.diagnosis.effects import TRIED, candidates, hypothesis_of, named
 from cosim.diagnosis.effects.base import NOT_DETERMINED, UNSEEN, Seen
 from cosim.diagnosis.effects.candidates import span_of
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.measure.concealment import Concealment, Hidden, Member, members, price
+from cosim.diagnosis.measure.concealment import Concealment, Hidden, Member, members
 from cosim.diagnosis.measure.findings import unit_on
 from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.estimation.fit import Fit
@@ -64,14 +64,10 @@ def bounds(comparison: Comparison, chosen: Fit, named: Sequence[str], largest: f
     concealment = Concealment(comparison, chosen, [one.columns for one in hidden], largest)
     groups: dict[str, list[tuple[Member, Hidden]]] = {}
     for one, place in zip(hidden, placed(hidden), strict=True):
-        groups.setdefault(one.effect, []).append((one, _hidden(one, place, comparison.policy.phase_price)))
+        costs = log(max(one.many, 1)) + comparison.policy.phase_price * one.phases
+        loud = hypothesis_of(one.instance).must_stand_out
+        groups.setdefault(one.effect, []).append((one, Hidden(one.effect, place, one.prior, costs, loud)))
     return tested(concealment, groups)
-
-
-def _hidden(one: Member, place: Array, phase_price: float) -> Hidden:
-    costs = price(one.many, one.phases, phase_price)
-    own = hypothesis_of(one.instance)
-    return Hidden(one.effect, place, one.prior, costs, own.must_stand_out)
 
 
 def tested(concealment: Concealment, members: Mapping[str, Sequence[tuple[Member, Hidden]]]) -> dict[str, SeenFrom]:
@@ -114,13 +110,10 @@ def _smallest(concealment: Concealment, members: Sequence[tuple[Member, Hidden]]
             break
         size *= STEP
     size *= MARGIN
-    places = [member.place for member, _, _ in shared]
-    first = shared[0][0]
-    return (
-        SeenFrom(first.none + size, (min(places), max(places)), power, first.instance)
-        if power >= POLICY.nearly_all
-        else None
-    )
+    if power < POLICY.nearly_all:
+        return None
+    places, first = [member.place for member, _, _ in shared], shared[0][0]
+    return SeenFrom(first.none + size, (min(places), max(places)), power, first.instance)
 
 
 def _raised(concealment: Concealment, member: Member, hidden: Hidden) -> float | None:
@@ -149,15 +142,11 @@ def not_found(comparison: Comparison, chosen: Fit, known: Sequence[str], largest
     problem, found = comparison.problem, bounds(comparison, chosen, known, largest)
     sizeless = {name for name in TRIED if named(name).share_of in problem.held}
     seen = {name: one for name, one in found.items() if name not in sizeless}
-    seen |= {name: seen[like] for name in TRIED if (like := named(name).same_as) in seen and _may_be(name, chosen)}
+    others = [(name, own) for name in TRIED if (own := named(name)).same_as in seen]
+    seen |= {name: seen[own.same_as] for name, own in others if not own.is_settled(chosen.mount)}
     reasons = {name: f"{NOT_DETERMINED} {named(name).share_of.rpartition('.')[2]}" for name in sizeless}
     lost = [name for name in TRIED if name not in known]
     return [_absent(n, seen.get(n), chosen.mount, problem.prepared, reasons.get(n, "")) for n in lost]
-
-
-def _may_be(name: str, chosen: Fit) -> bool:
-    """Whether the axis can have an effect that is another under its own name."""
-    return not named(name).is_settled(chosen.mount)
 
 
 def undecided(finding: Finding, standing: Sequence[AcceptedEffect], policy: Policy) -> Finding:
@@ -177,16 +166,16 @@ def undecided(finding: Finding, standing: Sequence[AcceptedEffect], policy: Poli
 def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared, reason: str) -> Finding:
     form = CATALOGUE[name][0]
     main = form.main
-    where = _looked(found, mount, prepared) if found else reason or named(name).why_not(mount, prepared)
-    value = main.factor * found.size if found else None
-    bound = Bound(
-        value=value,
-        unit=unit_on(main.unit, mount),
-        band_hz=(0.0, prepared.cutoff),
-        range=_range(found, prepared),
-        power=found.power if found else None,
-        reason=where,
-    )
+    axes = ("q", "v") if prepared.has_position else ("v",)
+    visited = {key: (float(prepared.ranges[key][0]), float(prepared.ranges[key][1])) for key in axes}
+    if found:
+        own, seen = hypothesis_of(found.instance), Seen(found.size, *found.places, prepared.cutoff)
+        where, range_ = own.looked(seen, mount), ({own.member: found.places} if own.member else {}) | visited
+    else:
+        where, range_ = reason or named(name).why_not(mount, prepared), visited
+    value, power = (main.factor * found.size, found.power) if found else (None, None)
+    band = (0.0, prepared.cutoff)
+    bound = Bound(value=value, unit=unit_on(main.unit, mount), band_hz=band, range=range_, power=power, reason=where)
     return Finding(
         effect=name,
         title=form.title,
@@ -199,15 +188,3 @@ def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared,
         action="" if found or named(name).is_settled(mount) else form.to_record,
         bound=bound,
     )
-
-
-def _range(found: SeenFrom | None, prepared: Prepared) -> dict[str, tuple[float, float]]:
-    """What a bound holds for: the members that were concealed, and the positions and speeds that were visited."""
-    visited = {key: (float(prepared.ranges[key][0]), float(prepared.ranges[key][1])) for key in ("q", "v")}
-    member = hypothesis_of(found.instance).member if found else ""
-    own = {member: found.places} if found and member else {}
-    return own | (visited if prepared.has_position else {"v": visited["v"]})
-
-
-def _looked(found: SeenFrom, mount: Mount, prepared: Prepared) -> str:
-    return hypothesis_of(found.instance).looked(Seen(found.size, *found.places, prepared.cutoff), mount)

@@ -14,7 +14,7 @@ tone, which has a phase of its own in each recording, twice at random.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import log, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -70,17 +70,13 @@ class Concealment:
         self._own, self._many = 1 + found.slopes.shape[1], nuisances.shape[1]
         stacked = np.column_stack([found.residual, found.slopes, nuisances, *columns])
         self._grams = comparison.bands.grams(comparison.bands.transform(stacked))
-        self._plain = self._plain_gram(np.column_stack([found.residual, *columns]))
-        self._before: dict[str, Marginal] = {}
-
-    def _plain_gram(self, columns: Array) -> Array:
-        """Gram matrix of residual and columns beyond the tangents of the structure, in N2 m2 over the rows."""
-        weight = self._comparison.problem.weight[:, None]
-        slopes = self._found.slopes * weight
+        weight = comparison.problem.weight[:, None]
+        slopes = found.slopes * weight
         basis, _ = np.linalg.qr(slopes / (np.sqrt((slopes**2).sum(0)) + 1e-300))
-        own = columns * weight
+        own = np.column_stack([found.residual, *columns]) * weight
         own = own - basis @ (basis.T @ own)
-        return np.asarray(own.T @ own)
+        self._plain = np.asarray(own.T @ own)  # beyond the tangents of the structure, in N2 m2 over the rows
+        self._before: dict[str, Marginal] = {}
 
     def energy(self, hidden: Hidden, weights: Array) -> float:
         """Share of the plain energy that concealing adds, relative to what is left now."""
@@ -157,11 +153,6 @@ def _energy(gram: Array, rows: Any) -> float:
     return float(gram[0, 0] - towards @ np.linalg.lstsq(gram[np.ix_(rows, rows)], towards, rcond=1e-12)[0])
 
 
-def price(members: int, phases: int = 0, phase_price: float = 0.0) -> float:
-    """Nats that a search among so many members, with phases of each recording's own, costs."""
-    return log(max(members, 1)) + phase_price * phases
-
-
 MOST_TORQUE = 10.0
 """Times the torque's RMS that no effect can be that is a torque."""
 
@@ -233,12 +224,9 @@ def _member(one: Candidate, columns: Array, problem: Problem, mount: Mount, torq
         none=own.none(mount),
         least=own.least(problem.sample_time),
         most=min(high, MOST_TORQUE * torque if main.unit == "N.m" else np.inf),
-        has_name=not own.easiest or _has_name(problem, mount, instance),
+        has_name=not own.easiest
+        or (own.shows(instance, mount, problem.prepared) and not is_degenerate(problem, instance)),
     )
-
-
-def _has_name(problem: Problem, mount: Mount, effect: Effect) -> bool:
-    return hypothesis_of(effect).shows(effect, mount, problem.prepared) and not is_degenerate(problem, effect)
 
 
 def _directions(one: Candidate, count: int) -> tuple[Array, ...]:
@@ -260,7 +248,8 @@ def _tones(prepared: Prepared, tones: Sequence[Candidate], torque: float, many: 
     for one in tones:
         instance = one.instances[0]
         hertz = float(getattr(instance, hypothesis_of(instance).member))
-        ways = tuple(_with_phases(draw.uniform(0, 2 * pi, pieces)) for _ in range(2))
+        phases = (draw.uniform(0, 2 * pi, pieces) for _ in range(2))
+        ways = tuple(np.column_stack([np.cos(one), np.sin(one)]).ravel() for one in phases)
         prior = np.full(2 * pieces, 0.5 * torque)
         yield Member(instance, _tone(prepared, hertz), ways, hertz, prior, many[one.effect], phases=pieces)
 
@@ -274,7 +263,3 @@ def _tone(prepared: Prepared, hertz: float) -> Array:
         waves = piece.lowpass(np.column_stack([np.sin(angle), np.cos(angle)]))[piece.kept]
         out[first : first + rows[number], 2 * number : 2 * number + 2] = waves
     return out
-
-
-def _with_phases(phases: Array) -> Array:
-    return np.column_stack([np.cos(phases), np.sin(phases)]).ravel()

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, floor, log10
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +65,7 @@ def accepted(
         units=_units(effect, mount),
         size=size,
         size_range=size_range,
-        statement=effect.statement("N" if mount.motion == "linear" else "N·m") + own.further(harmonics),
+        statement=effect.statement(unit_on("N.m", mount)) + own.further(harmonics),
         where=where(effect, traces),
         ruled_out=tuple(_behind(one, members, True)),
         less_likely=tuple(_behind(one, members, False)),
@@ -121,7 +122,7 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
         parameters=values,
         units=_units(effect, mount),
         size=size,
-        statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
+        statement=effect.statement(unit_on("N.m", mount)),
         told_apart_by=effect.told_apart_by,
         action=advice(effect, False, mount.motion),
     )
@@ -142,17 +143,11 @@ def measured_as(row: Finding, first: Finding, mount: Mount) -> Finding:
     if named(row.effect).same_as != first.effect:
         return row
     names = dict(zip(first.parameters, row.parameters, strict=True))
-    values = {names[name]: value for name, value in first.parameters.items()}
-    statement = CATALOGUE[row.effect][0](**values).statement("N" if mount.motion == "linear" else "N·m")
-    return replace(
-        row,
-        parameters=values,
-        standard_errors={names[name]: error for name, error in first.standard_errors.items()},
-        ranges={names[name]: ends for name, ends in first.ranges.items()},
-        size=first.size,
-        size_range=first.size_range,
-        statement=statement,
-    )
+    tables = (first.parameters, first.standard_errors, first.ranges)
+    values, errors, ranges = ({names[name]: one for name, one in table.items()} for table in tables)
+    known: Any = {"parameters": values, "standard_errors": errors, "ranges": ranges, "size": first.size}
+    said = CATALOGUE[row.effect][0](**values).statement(unit_on("N.m", mount))
+    return replace(row, **known, size_range=first.size_range, statement=said)
 
 
 def taken_finding(one: CandidateFit, quantity: str, mount: Mount) -> Finding:

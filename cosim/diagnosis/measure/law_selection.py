@@ -19,7 +19,7 @@ from cosim.estimation.discrepancy_basis import discrepancy_basis, friction_curve
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from pyfmi_models.friction import LAWS, FrictionLaw
+from pyfmi_models.friction import LAWS
 
 FOLDS = 4
 """Every so many blocks are predicted from the others."""
@@ -33,29 +33,19 @@ def proposed_law(problem: Problem, chosen: Fit) -> LawProposal:
     law = chosen.mount.friction
     base, gains = law.key, {law.key: 0.0}
     for form in (LAWS[key] for key in law.rivals):
-        gains[form.key] = _elements_gain(problem, chosen) if form.in_rows else _fitted_gain(problem, chosen, form)
+        if form.in_rows:  # a row of elements of free shares
+            gains[form.key] = _gain_of(problem, chosen, discrepancy_basis(problem.prepared)[0])
+            continue
+        common = {own.name for own in fields(law)} & {own.name for own in fields(form)}
+        other = form(**{name: getattr(law, name) for name in common})
+        fitted = problem.fit(replace(chosen.mount, friction=other), 36)
+        left, all_of_it = (float(np.sum((problem.weight * one.residual) ** 2)) for one in (fitted, chosen))
+        gains[form.key] = 1 - left / all_of_it
     best = max(gains, key=lambda key: gains[key])
     best = best if gains[best] > LEAST else base
     curve = 0.0 if base == "none" else _gain_of(problem, chosen, friction_curve(problem.prepared))
     gain, curve = (gains[best] if best != base else 0.0), (curve if curve > LEAST else 0.0)
     return {"base": base, "proposed": best, "gain": gain, "curve": curve}
-
-
-def _fitted_gain(problem: Problem, chosen: Fit, form: type[FrictionLaw]) -> float:
-    other = problem.fit(replace(chosen.mount, friction=_instead(chosen.mount.friction, form)), 36)
-    left, all_of_it = (float(np.sum((problem.weight * one.residual) ** 2)) for one in (other, chosen))
-    return 1 - left / all_of_it
-
-
-def _instead(law: FrictionLaw, form: type[FrictionLaw]) -> FrictionLaw:
-    """A law of another form with the numbers that both have."""
-    common = {own.name for own in fields(law)} & {own.name for own in fields(form)}
-    return form(**{name: getattr(law, name) for name in common})
-
-
-def _elements_gain(problem: Problem, chosen: Fit) -> float:
-    """Share that a row of elements of free shares removes."""
-    return _gain_of(problem, chosen, discrepancy_basis(problem.prepared)[0])
 
 
 def _gain_of(problem: Problem, chosen: Fit, shapes: Array) -> float:

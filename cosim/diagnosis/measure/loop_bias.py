@@ -35,7 +35,10 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> BiasEntry:
     asked = [on_set_point(piece) for piece in prepared.pieces]
     _, along = stacked(Inverse(found.mount, found.free), asked, found.values)
     slopes, residual = found.slopes * weight[:, None], found.residual * weight
-    explained = _projection(along * weight[:, None], slopes)
+    instruments = along * weight[:, None]
+    scale = np.sqrt((instruments**2).sum(0))
+    unit = instruments[:, scale > 0] / scale[scale > 0]
+    explained = unit @ np.linalg.lstsq(unit, slopes, rcond=RCOND)[0]
     energy = (slopes**2).sum(0)
     told = (explained**2).sum(0) > POLICY.half * np.maximum(energy, 1e-300)
     names = [name for name, ok in zip(found.free, told, strict=True) if ok]
@@ -43,12 +46,6 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> BiasEntry:
     if not names or len(blocks.rows) < 2 * len(names):
         return {}
     return _tested(slopes[:, told], (slopes - explained)[:, told], residual, blocks, names, found.values[told])
-
-
-def _projection(instruments: Array, columns: Array) -> Array:
-    scale = np.sqrt((instruments**2).sum(0))
-    unit = instruments[:, scale > 0] / scale[scale > 0]
-    return np.asarray(unit @ np.linalg.lstsq(unit, columns, rcond=RCOND)[0])
 
 
 def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: list[str], values: Array) -> BiasEntry:

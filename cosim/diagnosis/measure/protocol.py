@@ -20,7 +20,7 @@ from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import PROTOCOL_HZ, Array, Band, Piece, Prepared, prepare
+from cosim.estimation.prepare import PROTOCOL_HZ, Band, Prepared, prepare
 from cosim.estimation.residuals import inside, kept, residuals
 from cosim.estimation.row_weights import least_speed
 from cosim.support.statistics import Z95, rms
@@ -101,15 +101,14 @@ def _sliding(prepared: Prepared, models: Structures) -> dict[str, float]:
 
 def _floor(prepared: Prepared, mount: Mount) -> float:
     """RMS that a general friction model and slow drifts, fitted to this very recording, would leave: noise, roughly."""
-    drift = np.concatenate([_drifts(piece)[piece.kept] for piece in prepared.pieces])
-    return rms(projected(kept(prepared, mount), np.column_stack([*discrepancy_basis(prepared), drift])))
-
-
-def _drifts(piece: Piece) -> Array:
-    x = (piece.t - piece.t[0]) / (piece.t[-1] - piece.t[0])
-    sign = np.tanh(piece.v / (0.01 * np.abs(piece.v).max() + 1e-300))
-    waves = [np.cos(np.pi * k * x) for k in range(6)]
-    return piece.lowpass(np.column_stack([*waves, *(sign * wave for wave in waves)]))
+    drifts = []
+    for piece in prepared.pieces:
+        x = (piece.t - piece.t[0]) / (piece.t[-1] - piece.t[0])
+        sign = np.tanh(piece.v / (0.01 * np.abs(piece.v).max() + 1e-300))
+        waves = [np.cos(np.pi * k * x) for k in range(6)]
+        drifts.append(piece.lowpass(np.column_stack([*waves, *(sign * wave for wave in waves)]))[piece.kept])
+    shapes = np.column_stack([*discrepancy_basis(prepared), np.concatenate(drifts)])
+    return rms(projected(kept(prepared, mount), shapes))
 
 
 def of_the_best(interval: tuple[float, float], value: float, many: int) -> tuple[float, float]:
@@ -145,6 +144,7 @@ def _residuals(prepared: Prepared, models: Structures, fitted: bool) -> list[Res
 
 def _trace(prepared: Prepared, pieces: Sequence[Residual], intervals: Spans) -> Trace:
     (name,) = prepared.names
+    more = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
     q, tau = (np.concatenate([getattr(p, signal)[p.inside] for p in prepared.pieces]) for signal in ("q", "tau"))
     t, v, before, after = (
         np.concatenate([getattr(one, signal) for one in pieces]) for signal in ("t", "v", "residual", "after")
@@ -161,10 +161,5 @@ def _trace(prepared: Prepared, pieces: Sequence[Residual], intervals: Spans) -> 
         missing=before,
         band=Z95 * noise_at(v, after, v),
         intervals=intervals,
-        extras=_extras(prepared),
+        extras={name: np.concatenate([p.extras[name][p.inside] for p in prepared.pieces]) for name in more},
     )
-
-
-def _extras(prepared: Prepared) -> dict[str, Array]:
-    names = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    return {name: np.concatenate([piece.extras[name][piece.inside] for piece in prepared.pieces]) for name in names}

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity, not_determined_doubts
@@ -36,9 +37,10 @@ def without_names(
     """
     base, limits = limited(problem, base)
     unknown = not_determined(problem, limits)
+    untestable: Any = {"answer": "not_testable", "probability": 0.0, "gain": 0.0, "evidence": WHY, "action": ACTION}
     return replace(
         measured(problem, Structures(problem.mount, base, base), train, heldout),
-        findings=tuple(_untestable(name) for name in TRIED),
+        findings=tuple(Finding(effect=name, title=CATALOGUE[name][0].title, **untestable) for name in TRIED),
         sanity=(*sanity, *not_determined_doubts(unknown)),
         not_determined=unknown,
         seconds=time.perf_counter() - started,
@@ -64,11 +66,4 @@ def measured(
         motion=problem.mount.motion,
         data_quality=tuple(note for one in (*train, *heldout) for note in quality(one, problem.prepared.cutoff)),
         base_parameters=models.base_parameters(),
-    )
-
-
-def _untestable(name: str) -> Finding:
-    title = CATALOGUE[name][0].title
-    return Finding(
-        effect=name, title=title, answer="not_testable", probability=0.0, gain=0.0, evidence=WHY, action=ACTION
     )
