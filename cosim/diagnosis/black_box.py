@@ -36,7 +36,6 @@ from cosim.system.wire import Record, Wire
 from pyfmi_models.card import Card
 from pyfmi_models.controller_section import ControllerSection
 from pyfmi_models.export import export_fmu
-from pyfmi_models.mount import Mount
 
 SET_POINT = ("q_d", "v_d", "a_d")
 TRIAL = 5.0
@@ -104,7 +103,10 @@ def as_base(
             followed.append([follower.followed(piece) for piece in one.pieces])
     fitted = len(train)
     like = _likeness([piece for pieces in followed[:fitted] for piece in pieces], card)
-    misfits = [_misfits(pieces, like.plant()) for pieces in followed]
+    inverse, misfits = Inverse(like.plant(), ()), []
+    for pieces in followed:  # what the FMU needs beyond the card; nothing at the edges of pieces, where filters settle
+        needed = [inverse.torque(piece, np.zeros(0))[0] for piece in pieces]
+        misfits.append([np.where(p.inside, p.tau - one, 0.0) for p, one in zip(pieces, needed, strict=True)])
     unlike = rms(np.concatenate([misfit for one in misfits[:fitted] for misfit in one]))
     note = f"The base is {box.label}; the card that is most like it needs another torque by {unlike:.3g} RMS."
     beside = [_without(one, pieces, misfit) for one, pieces, misfit in zip(recordings, followed, misfits, strict=True)]
@@ -210,12 +212,6 @@ def _likeness(pieces: Sequence[Piece], card: Card) -> Card:
     base = fit(card.plant(), pieces, weight).mount
     section = card.mount.model_copy(update={"inertia": float(base.axis.inertia)})
     return replace(card, mount=section, friction=base.friction)
-
-
-def _misfits(pieces: Sequence[Piece], like: Mount) -> list[Array]:
-    """What the FMU needs beyond the card, at the rows of each piece; nothing at its edges, where filters settle."""
-    inverse = Inverse(like, ())
-    return [np.where(piece.inside, piece.tau - inverse.torque(piece, np.zeros(0))[0], 0.0) for piece in pieces]
 
 
 def _without(recording: Recording, pieces: Sequence[Piece], misfits: Sequence[Array]) -> Recording:

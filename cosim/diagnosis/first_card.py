@@ -16,7 +16,6 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.data.neighbours import Neighbour
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -33,7 +32,7 @@ from cosim.support.errors import InputError, RecordingError
 from cosim.support.statistics import SURELY, Z95, column_rms
 from pyfmi_models.effects import Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
+from pyfmi_models.mount import LINEAR_UNITS, Axis, Mount
 
 LEAST_TRAVEL = 0.35
 """Travel [rad] from which a weight differs from a constant torque and a spring: its cosine changes by .06 in 20 deg."""
@@ -111,8 +110,13 @@ def first_card(
         _check_inertia(numbers, linear)
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
-    notes = (*_neighbour_note(beside, problem.prepared.neighbours), *_notes(numbers, explained))
-    return FirstCard(_held(best.mount, numbers), numbers, explained, notes)
+    notes = _notes(numbers, explained)
+    if beside and beside.is_determined:
+        low, high = beside.range
+        said = f"{beside.value:.3g} {beside.unit} (95 %: {low:.3g} to {high:.3g})"
+        names = ", ".join(one.name for one in problem.prepared.neighbours)
+        notes.insert(0, f"The inertia shows only beside the motion of {names}: {said}.")
+    return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(notes))
 
 
 def _with_loads(problem: Problem, found: Fit, inertia: float | None, on_progress: OnProgress) -> tuple[Problem, Fit]:
@@ -174,7 +178,7 @@ def _others(prepared: Prepared, turns: bool) -> Iterator[Array]:
     q = prepared.stacked("q")
     for one in prepared.neighbours:
         yield prepared.of_neighbour(key(one.name, "acceleration"))
-        if turns and _is_angle(one):
+        if turns and one.turns and one.position:
             angle = prepared.of_neighbour(key(one.name, "position"))
             for together in (angle, q + angle, q - angle):
                 yield from _weight(together)
@@ -182,19 +186,6 @@ def _others(prepared: Prepared, turns: bool) -> Iterator[Array]:
 
 def _weight(angle: Array) -> tuple[Array, Array]:
     return np.sin(angle), np.cos(angle)
-
-
-def _is_angle(one: Neighbour) -> bool:
-    return one.turns and bool(one.position)
-
-
-def _neighbour_note(inertia: Number | None, neighbours: Sequence[Neighbour]) -> tuple[str, ...]:
-    """Say beside which neighbours the inertia was estimated."""
-    if not (inertia and inertia.is_determined):
-        return ()
-    low, high = inertia.range
-    said = f"{inertia.value:.3g} {inertia.unit} (95 %: {low:.3g} to {high:.3g})"
-    return (f"The inertia shows only beside the motion of {', '.join(one.name for one in neighbours)}: {said}.",)
 
 
 def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None) -> tuple[Problem, Fit]:
@@ -270,14 +261,9 @@ def _numbers(problem: Problem, found: Fit, inertia: float | None, linear: bool) 
         variable, error = known[name], errors[name]
         inside = isfinite(error) and value > variable.low and value < variable.high
         determined = inside and (abs(value) > SURELY * error or name.endswith("phase"))
-        unit = _linear(variable.unit) if linear else variable.unit
+        unit = LINEAR_UNITS.get(variable.unit, variable.unit) if linear else variable.unit
         numbers.append(Number(name, value, error, unit, determined))
     return numbers
-
-
-def _linear(unit: str) -> str:
-    """The unit of a number of an axis that moves along, from that of one that turns."""
-    return {"kg.m2": "kg", "N.m": "N", "N.m.s/rad": "N.s/m"}.get(unit, unit)
 
 
 def _held(mount: Mount, numbers: Sequence[Number]) -> Mount:

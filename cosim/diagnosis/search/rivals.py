@@ -93,74 +93,110 @@ def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> 
 
     Where swaps go in a circle, or everything was asked beside `most_structures`, what stands is examined as it is.
     """
-    chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
-    ended = CHANGED_PLACES
+    chosen, ended = found.chosen, CHANGED_PLACES
+    asked = _Examination(comparison, {_names(one.current): one for one in found.stages}, refits)
     for _ in range(ROUNDS):
-        effects, better = _round(comparison, chosen, known, refits)
+        effects, better = asked.round(chosen)
         if better is None:
-            better = _grown(comparison, effects, _stage_after(comparison, chosen, known, refits))
+            better = asked.grown(effects, asked.stage_after(chosen))
         if better is None:
-            return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits))
+            return Examined(found.base, chosen, tuple(effects), asked.stage_after(chosen))
         chosen = better
-        if len(known) >= comparison.policy.most_structures:
-            ended = f"The search ended after all effects had been tried beside {len(known)} structures: {NOT_ASKED}"
+        if len(asked.known) >= comparison.policy.most_structures:
+            ended = (
+                f"The search ended after all effects had been tried beside {len(asked.known)} structures: {NOT_ASKED}"
+            )
             break
-    effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
-    return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits), (ended,))
+    effects = [asked.challenged(chosen, group) for group in grouped(comparison, chosen)]
+    return Examined(found.base, chosen, tuple(effects), asked.stage_after(chosen), (ended,))
 
 
-def _stage_after(
-    comparison: Comparison, fit: Fit, known: Stages, refits: InTurn, stands: CandidateFit | None = None
-) -> Stage:
-    """What was tried beside a structure, found once; `stands`: an effect that is fitted beside it already."""
-    if _names(fit) not in known:
-        known[_names(fit)] = stage(comparison, fit, refits, stands)
-    return known[_names(fit)]
+@dataclass(frozen=True)
+class _Examination:
+    """What all challenges share: the comparison, what was tried beside each structure, and what refits them."""
 
+    comparison: Comparison
+    known: Stages
+    refits: InTurn
 
-def _without(
-    comparison: Comparison, chosen: Fit, group: tuple[Effect, ...], known: Stages, refits: InTurn
-) -> tuple[Stage, CandidateFit]:
-    """What was tried beside a structure without one of its effects, and that effect there.
+    def stage_after(self, fit: Fit, stands: CandidateFit | None = None) -> Stage:
+        """What was tried beside a structure, found once; `stands`: an effect that is fitted beside it already."""
+        names = _names(fit)
+        if names not in self.known:
+            self.known[names] = stage(self.comparison, fit, self.refits, stands)
+        return self.known[names]
 
-    It is not fitted once more, but for what other forms of it may tell: multiples of a ripple, a coupling's.
-    """
-    without = comparison.problem.without(chosen, group[0].name)
-    own = weighed(comparison, chosen, without, effect=group[0])
-    is_one = len(group) == 1 and not group[0].source
-    beside = _stage_after(comparison, without, known, refits, own if is_one else None)
-    same = beside.current is without
-    return beside, own if same else weighed(comparison, chosen, beside.current, effect=group[0])
+    def without(self, chosen: Fit, group: tuple[Effect, ...]) -> tuple[Stage, CandidateFit]:
+        """What was tried beside a structure without one of its effects, and that effect there.
 
+        It is not fitted once more, but for what other forms of it may tell: multiples of a ripple, a coupling's.
+        """
+        without = self.comparison.problem.without(chosen, group[0].name)
+        own = weighed(self.comparison, chosen, without, effect=group[0])
+        beside = self.stage_after(without, own if len(group) == 1 and not group[0].source else None)
+        if beside.current is without:
+            return beside, own
+        return beside, weighed(self.comparison, chosen, beside.current, effect=group[0])
 
-def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
-    """The structure with one more effect, of which the search, which went another way, may not have known."""
-    if any(is_small(one.own, comparison.policy) for one in effects):
-        return None
-    best = best_of(comparison, beside, max((one.own.evidence for one in effects), default=0.0))
-    if best is None or is_full(best, comparison):
-        return None
-    return at_its_end(comparison, best, beside.current).fit
+    def grown(self, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
+        """The structure with one more effect, of which the search, which went another way, may not have known."""
+        if any(is_small(one.own, self.comparison.policy) for one in effects):
+            return None
+        best = best_of(self.comparison, beside, max((one.own.evidence for one in effects), default=0.0))
+        if best is None or is_full(best, self.comparison):
+            return None
+        return at_its_end(self.comparison, best, beside.current).fit
 
+    def round(self, chosen: Fit) -> tuple[list[AcceptedEffect], Fit | None]:
+        """The effects of a structure, each challenged; none and another structure where one of them gives way."""
+        effects, groups, policy = [], grouped(self.comparison, chosen), self.comparison.policy
+        for group in groups:
+            one = self.challenged(chosen, group)
+            if one.own.evidence < policy.clear and len(groups) > 1:
+                return [], one.without
+            best = settled(one.misfits, one.own, one.rivals)
+            least = one.own.evidence - policy.fair
+            best = next((form for form in one.simpler if form.evidence > least), best)
+            if best is one.own:
+                free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
+                best = next((rival for rival in free if _takes(rival, one, policy)), best)
+            if best is not one.own:
+                return [], at_its_end(self.comparison, best, one.without).fit
+            effects.append(one)
+        return effects, None
 
-def _round(
-    comparison: Comparison, chosen: Fit, known: Stages, refits: InTurn
-) -> tuple[list[AcceptedEffect], Fit | None]:
-    effects = []
-    for group in grouped(comparison, chosen):
-        one = _challenged(comparison, chosen, group, known, refits)
-        if one.own.evidence < comparison.policy.clear and len(grouped(comparison, chosen)) > 1:
-            return [], one.without
-        best = settled(one.misfits, one.own, one.rivals)
-        least = one.own.evidence - comparison.policy.fair
-        best = next((form for form in one.simpler if form.evidence > least), best)
-        if best is one.own:
-            free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
-            best = next((rival for rival in free if _takes(rival, one, comparison.policy)), best)
-        if best is not one.own:
-            return [], at_its_end(comparison, best, one.without).fit
-        effects.append(one)
-    return effects, None
+    def challenged(self, chosen: Fit, group: tuple[Effect, ...]) -> AcceptedEffect:
+        """An effect of a structure, and each other effect that may stand in its place."""
+        comparison, problem, name = self.comparison, self.comparison.problem, group[0].name
+        self.refits.on_progress(group[0].title)
+        rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
+        beside, own = self.without(chosen, group)
+        others = [one for one in beside.tried if one.effect.name != name]
+        if len(rest) > len(problem.mount.effects):
+            standing = replace(chosen.mount, effects=rest)
+            # Another start gained 71 nats once and 2 at most else (65 fits of 30 cases): none comes back from so far.
+            others = [
+                refitted_from_here(comparison, standing, beside.current, one)
+                if own.evidence - one.evidence < comparison.policy.sure
+                else one
+                for one in others
+            ]
+        best: dict[str, CandidateFit] = {}
+        for rival in (one for one in others if _is_admissible(comparison, one)):
+            if rival.effect.name not in best or rival.evidence > best[rival.effect.name].evidence:
+                best[rival.effect.name] = rival
+        near = [key for key, rival in best.items() if contest(comparison, own, rival) < comparison.policy.clear]
+        best |= {key: at_its_end(comparison, best[key], beside.current) for key in near}
+        misfits = misfits_of(problem.prepared, chosen.mount, group[0])
+        margins = {key: margin(comparison, own, rival) for key, rival in best.items()}
+        ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.name])
+        contests = {rival.effect.name: contest(comparison, own, rival) for rival in ranked}
+        fewer = [one for one in beside.tried if one.effect.name == name and one.fit.count < own.fit.count]
+        simpler = tuple(fewer) if group[0].source else ()
+        one = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits, simpler)
+        found = with_names(one)
+        _enter(comparison, found)
+        return found
 
 
 def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
@@ -191,45 +227,6 @@ def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
     for effect in chosen.mount.effects[len(comparison.problem.mount.effects) :]:
         groups.setdefault(effect.name, []).append(effect)
     return [tuple(group) for group in groups.values()]
-
-
-def _challenged(
-    comparison: Comparison,
-    chosen: Fit,
-    group: tuple[Effect, ...],
-    known: Stages,
-    refits: InTurn,
-) -> AcceptedEffect:
-    problem = comparison.problem
-    refits.on_progress(group[0].title)
-    rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    beside, own = _without(comparison, chosen, group, known, refits)
-    others = [one for one in beside.tried if one.effect.name != group[0].name]
-    if len(rest) > len(problem.mount.effects):
-        standing = replace(chosen.mount, effects=rest)
-        # Another start gained 71 nats once and 2 at most else (65 fits of 30 cases): no rival comes back from so far.
-        others = [
-            refitted_from_here(comparison, standing, beside.current, one)
-            if own.evidence - one.evidence < comparison.policy.sure
-            else one
-            for one in others
-        ]
-    rivals = [one for one in others if _is_admissible(comparison, one)]
-    best: dict[str, CandidateFit] = {}
-    for rival in rivals:
-        if rival.effect.name not in best or rival.evidence > best[rival.effect.name].evidence:
-            best[rival.effect.name] = rival
-    near = [name for name, rival in best.items() if contest(comparison, own, rival) < comparison.policy.clear]
-    best |= {name: at_its_end(comparison, best[name], beside.current) for name in near}
-    misfits = misfits_of(problem.prepared, chosen.mount, group[0])
-    margins = {rival.effect.name: margin(comparison, own, rival) for rival in best.values()}
-    ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.name])
-    contests = {rival.effect.name: contest(comparison, own, rival) for rival in ranked}
-    fewer = [one for one in beside.tried if one.effect.name == group[0].name and one.fit.count < own.fit.count]
-    simpler = tuple(fewer) if group[0].source else ()
-    found = with_names(AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits, simpler))
-    _enter(comparison, found)
-    return found
 
 
 def refitted_from_here(comparison: Comparison, rest: Mount, without: Fit, one: CandidateFit) -> CandidateFit:
@@ -267,22 +264,15 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
     name, own, policy = found.effect.name, found.own, comparison.policy
     comparison.enter(name, own.fit, own.plain_gain)
     kept = at_least("evidence beside the other effects", own.evidence, policy.clear, "nats")
-    comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
+    ahead = (
+        at_least(f"ahead of {r.effect.name}", found.contests[r.effect.name], policy.fair, "nats") for r in found.rivals
+    )
+    comparison.judge(name, own.fit, [kept, *ahead])
     for rival in found.rivals:
         comparison.enter(rival.effect.name, rival.fit, rival.plain_gain)
-        behind = found.contests[rival.effect.name]
-        rule = Rule(
-            f"less than the margin of a set behind {name}",
-            behind < policy.fair,
-            behind,
-            policy.fair,
-            "nats",
-        )
+        behind, said = found.contests[rival.effect.name], f"less than the margin of a set behind {name}"
+        rule = Rule(said, behind < policy.fair, behind, policy.fair, "nats")
         comparison.judge(rival.effect.name, rival.fit, [rule])
-
-
-def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
-    return at_least(f"ahead of {rival.effect.name}", found.contests[rival.effect.name], policy.fair, "nats")
 
 
 def _names(found: Fit) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
     forms: dict[type[Effect], list[Screened]] = {}
     for one in screened:
         forms.setdefault(one.form, []).append(one)
-    hopeful = {form: members for form, members in forms.items() if any(is_hopeful(one, policy) for one in members)}
+    hopeful = {form: some for form, some in forms.items() if any(is_hopeful(one, policy) for one in some)}
     ranked = []
     for statistic in ("evidence", "plain"):
         best = {form: max(members, key=lambda one: getattr(one, statistic)) for form, members in hopeful.items()}
@@ -211,21 +211,17 @@ def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Ite
 
 
 def _search_rules(comparison: Comparison, one: CandidateFit, largest: float) -> Iterator[Rule]:
-    """Rules by which the search takes an effect, beside others of which the largest has so much evidence."""
-    policy = comparison.policy
-    limit = policy.clear if _has_own_cause(one) else least(policy, largest, one.plain_gain)
+    """Rules by which the search takes an effect, beside others of which the largest has so much evidence.
+
+    The cause of a coupling beside one with another neighbour was recorded, and moves by itself: what the equation of
+    the other lacks does not follow that. With three weak couplings beside a strong one the held-out error is half as
+    large so as by `least`.
+    """
+    policy, own = comparison.policy, one.effect
+    has_own_cause = any(other.id == own.id and other.source != own.source for other in one.fit.mount.effects)
+    limit = policy.clear if has_own_cause else least(policy, largest, one.plain_gain)
     yield at_least("evidence", one.evidence, limit, "nats")
     yield from admission(comparison, one)
-
-
-def _has_own_cause(one: CandidateFit) -> bool:
-    """Whether an effect is a coupling beside one with another neighbour.
-
-    Its cause was recorded, and moves by itself: what the equation of the other lacks does not follow that. With three
-    weak couplings beside a strong one the held-out error is half as large so as by `least`.
-    """
-    effect = one.effect
-    return any(other.id == effect.id and other.source != effect.source for other in one.fit.mount.effects)
 
 
 def _demanded(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateFit | None:

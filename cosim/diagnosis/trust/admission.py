@@ -12,7 +12,6 @@ from cosim.estimation.prepare import LEAST_SECONDS as SHORTEST
 from cosim.estimation.prepare import STEADY, Array
 from cosim.support.errors import InputError, RecordingError
 from cosim.support.statistics import rms
-from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
@@ -27,17 +26,12 @@ def check_effects(mount: Mount, recordings: Sequence[Recording] = ()) -> None:
     So is one that reads a neighbour of which recordings have no column (RecordingError).
     """
     for effect in mount.effects:
-        if not is_held(effect):
+        if not effect.is_determined:  # what was drawn by chance
             text = (
                 f"The card holds {effect.id}, which a diagnosis cannot take into account yet; take it out of the card."
             )
             raise InputError(text, culprit=effect.id)
     check_neighbours(mount, recordings)
-
-
-def is_held(effect: Effect) -> bool:
-    """Whether `Inverse` holds an effect: not what was drawn by chance."""
-    return effect.is_determined
 
 
 def check_neighbours(mount: Mount, recordings: Sequence[Recording]) -> None:
@@ -66,12 +60,12 @@ def check_recordings(train: Sequence[Recording], heldout: Sequence[Recording]) -
                 f"whether it is fitted or held out. Record longer, or split what there is in another place."
             )
             raise RecordingError(text, culprit=recording.name, value=recording.duration)
-        _check_motion(recording)
-    _check_length(train)
-
-
-def _check_length(train: Sequence[Recording]) -> None:
-    """Refuse too little to fit: what is enough follows from how often the motion repeats what is to be told."""
+        name, slow = "q" if "q" in recording else "v", _slow(recording)
+        moves = np.abs(np.diff(slow)).sum() if name == "q" else np.abs(slow).max()
+        if moves <= 0:
+            said = f"{recording.name}: {name} never moves, so there is nothing to diagnose."
+            raise RecordingError(said, culprit=name)
+    # What is enough follows from how often the motion repeats what is to be told.
     seconds, rows = sum(one.duration for one in train), sum(len(one) for one in train)
     cycles = sum(map(_cycles, train))
     is_quick = seconds >= QUICK_SECONDS and cycles >= LEAST_CYCLES and rows >= LEAST_ROWS
@@ -98,10 +92,3 @@ def _slow(recording: Recording) -> Array:
     """Position, or the speed where that alone was read, without what is faster than 10 Hz."""
     dt = recording.sample_time
     return lowpass(recording["q" if "q" in recording else "v"], dt, min(10.0, 0.2 / dt))
-
-
-def _check_motion(recording: Recording) -> None:
-    name, slow = "q" if "q" in recording else "v", _slow(recording)
-    moves = np.abs(np.diff(slow)).sum() if name == "q" else np.abs(slow).max()
-    if moves <= 0:
-        raise RecordingError(f"{recording.name}: {name} never moves, so there is nothing to diagnose.", culprit=name)

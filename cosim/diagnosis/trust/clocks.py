@@ -128,7 +128,9 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
 
 
 def _misfit(balance: Balance) -> _Left:
-    torque, columns = _shifted(balance), balance.columns(balance.own_order)
+    pieces, columns = balance.prepared.pieces, balance.columns(balance.own_order)
+    # The torque at each lag before the kept rows, (rows, lags); NaN beyond the ends of a piece.
+    torque = np.concatenate([between(one.t, one.tau, one.t[one.kept][:, None] - LAGS) for one in pieces])
     inside = (far_from_turns(balance.prepared) > 0) & np.all(np.isfinite(torque), axis=1)
     if inside.sum() < ROWS_A_COLUMN * columns.shape[1]:
         return _Left(np.ones(len(LAGS)))
@@ -144,9 +146,3 @@ def _likelihood(balance: Balance, left: _Left) -> Array:
     """Log-likelihood of each lag."""
     rows = left.share * balance.solution(balance.own_order).independent * left.explained
     return np.asarray(-0.5 * rows * np.log(left.energy + left.share * balance.overlooked))
-
-
-def _shifted(balance: Balance) -> Array:
-    """The torque at each lag before the kept rows, (rows, lags); NaN beyond the ends of a piece."""
-    pieces = balance.prepared.pieces
-    return np.concatenate([between(one.t, one.tau, one.t[one.kept][:, None] - LAGS) for one in pieces])

@@ -3,7 +3,7 @@
 The model with its effects may deny one: what is missing from a plain balance looks like two clocks.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_poi
 from cosim.estimation.fit import Fit, edges_of
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card
-from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 ASSUMED = '" was taken for '
@@ -123,18 +122,8 @@ def without_denied(sanity: Sequence[Sanity], chosen: Fit, beside: Stage) -> tupl
         chosen: the structure that stands.
         beside: what was tried beside it.
     """
-    latest = max((abs(lag) for lag in _lags(chosen, beside)), default=0.0)
-    return tuple(sanity) if latest >= LATE / 2 else beyond_denial(sanity)
-
-
-def _lags(chosen: Fit, beside: Stage) -> Iterator[float]:
-    """Lags [s] of the structure, and those that gained anything beside it."""
-    yield from (_lag(effect) for effect in chosen.mount.effects if hypothesis_of(effect).is_timing)
-    for one in beside.tried:
-        if one.evidence > 0 and hypothesis_of(one.effect).is_timing:
-            yield _lag(one.fit.mount.effects[-1])
-
-
-def _lag(effect: Effect) -> float:
-    """Seconds by which a timing effect is late; all of them count in milliseconds."""
-    return float(getattr(effect, effect.main.parameter)) / 1e3
+    gained = [one for one in beside.tried if one.evidence > 0 and hypothesis_of(one.effect).is_timing]
+    timing = [one for one in chosen.mount.effects if hypothesis_of(one).is_timing]
+    timing += [one.fit.mount.effects[-1] for one in gained]
+    lags = [abs(float(getattr(one, one.main.parameter)) / 1e3) for one in timing]  # they count in milliseconds
+    return tuple(sanity) if max(lags, default=0.0) >= LATE / 2 else beyond_denial(sanity)

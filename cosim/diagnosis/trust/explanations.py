@@ -92,18 +92,17 @@ def explanations(
     yield from (one for one in _torques(linear) if not (one.option and "tau" in stated))
     for unit, (factor, prior) in TIMES.items():
         yield _off("time_unit", f"t counts {unit}", prior, factor, "time", option=f"--units t={unit}")
-    yield from _halves(reading) if speed_off == 1.0 else _contradiction(speed_off, linear, is_counted)
+    if speed_off != 1.0:
+        yield from _contradiction(speed_off, linear, is_counted)
+        return
+    # A radius for a diameter, a quadrature that is not counted.
+    for factor, how, prior in ((2.0, "twice too large", 0.01), (0.5, "half as large as it should be", 0.005)):
+        yield _off("position_scale", f'"{reading}" is {how}', prior, factor, "position")
 
 
 def _off(kind: Kind, what: str, prior: float, factor: float, column: str, **more: Any) -> Explanation:
     """A column of which all numbers are so many times too large."""
     return Explanation(kind=kind, what=what, prior=prior, factor=factor, **{column: factor, **more})
-
-
-def _halves(reading: str) -> Iterator[Explanation]:
-    """A radius for a diameter, a quadrature that is not counted."""
-    for factor, how, prior in ((2.0, "twice too large", 0.01), (0.5, "half as large as it should be", 0.005)):
-        yield _off("position_scale", f'"{reading}" is {how}', prior, factor, "position")
 
 
 def _contradiction(k: float, linear: bool, is_counted: bool) -> Iterator[Explanation]:

@@ -84,19 +84,16 @@ class Evidence:
         balance = self.balance(explanation.time)
         if not balance.is_told:
             return -float("inf")
-        order = self._order(explanation)
+        # How often gravity comes in one radian of the reading; 0 on a linear axis.
+        order = 0.0 if self.reference.linear or explanation.is_counted else 1 / explanation.position
         solution, known = balance.solution(order), self.reference
         torque, position = explanation.torque, explanation.position
         found = _gain(solution.inertia, known.inertia * torque / position, known.spread_of_inertia(explanation))
         if known.coulomb:
             found += _gain(solution.coulomb, known.coulomb * torque, known.spread_of_friction(explanation))
         found -= float(np.logaddexp(0.0, -copysign(1.0, torque) * np.clip(solution.sign, -POLICY.clear, POLICY.clear)))
-        found += (
-            self._size(balance, explanation)
-            + self._gravity(balance, order)
-            + self._rate(rate)
-            + self._limit(explanation)
-        )
+        sized = self._size(balance, explanation)
+        found += sized + self._gravity(balance, order) + self._rate(rate) + self._limit(explanation)
         return found + sum(_slip_likelihood(slope, explanation, kind) for kind, slope in self._slopes)
 
     def balance(self, time: float) -> Balance:
@@ -111,10 +108,6 @@ class Evidence:
         needed = self.reference.inertia * balance.acceleration / explanation.position + (self.reference.coulomb or 0.0)
         off = log(balance.torque / abs(explanation.torque) / needed) / spread
         return -0.5 * off**2 - log(spread)
-
-    def _order(self, explanation: Explanation) -> float:
-        """How often gravity comes in one radian of the reading; 0 on a linear axis."""
-        return 0.0 if self.reference.linear or explanation.is_counted else 1 / explanation.position
 
     @staticmethod
     def _gravity(balance: Balance, order: float) -> float:
