@@ -184,7 +184,6 @@ class _Follower:
 
 
 def _start(box: BlackBox) -> float:
-    """Position at which an FMU starts."""
     system = System(
         components={"plant": box.fmu},
         wires=[Wire("none", "plant.tau")],

@@ -237,7 +237,6 @@ def _problem(train: Sequence[Recording], card: Card) -> Problem:
 
 
 def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Recording]) -> Answer:
-    """Prove, measure what is left, decide."""
     prepared = prepare(heldout, comparison.problem.prepared.band)
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, PROTOCOL_HZ))
     examined, proof = prove_sets(comparison, examined, held)
@@ -247,7 +246,6 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> Diagnosis:
-    """What stands, measured on all recordings and put into words."""
     problem, decision = answer.comparison.problem, answer.decision
     seen = measured(problem, answer.models(), train, heldout)
     found = _findings(answer, seen.traces)
@@ -337,7 +335,6 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
 
 
 def _experiment(answer: Answer) -> Experiment | None:
-    """What would settle the first open question."""
     for one in answer.proof.standing:
         for rival in one.rivals:
             if rival.effect.name in answer.decision.sets[one.effect.name] and not is_renamed(rival.effect):

@@ -72,7 +72,7 @@ class FirstCard:
 
     def number(self, name: str) -> Number:
         """A number by its name."""
-        return next(one for one in self.numbers if one.name == name)
+        return _number(self.numbers, name)
 
 
 def first_card(
@@ -100,7 +100,7 @@ def first_card(
     on_progress("reading the torque balance")
     problem, best = _with_loads(*_base(recordings, motion, inertia), inertia, on_progress)
     numbers = tuple(_numbers(problem, best, inertia, linear))
-    beside = _with_neighbours(problem, _inertia_of(numbers), linear)
+    beside = _with_neighbours(problem, _number(numbers), linear)
     if beside:
         on_progress("reading the inertia beside the motion of the neighbours")
         problem, best = _with_loads(*_base(recordings, motion, _within(beside)), _within(beside), on_progress)
@@ -276,15 +276,15 @@ def _held(mount: Mount, numbers: Sequence[Number]) -> Mount:
     return replace(mount, friction=replace(law, **zero))  # type: ignore[arg-type]
 
 
-def _inertia_of(numbers: Sequence[Number]) -> Number:
-    return next(one for one in numbers if one.name == "axis.inertia")
+def _number(numbers: Sequence[Number], name: str = "axis.inertia") -> Number:
+    return next(one for one in numbers if one.name == name)
 
 
 def _is_small(problem: Problem, tau: Array, numbers: Sequence[Number]) -> bool:
     """Whether the axis speeds up and its inertia takes at most a part of the torque, whatever it is."""
     if all(piece.is_steady for piece in problem.prepared.pieces):
         return False
-    inertia = _inertia_of(numbers)
+    inertia = _number(numbers)
     most = inertia.range[1] * float(np.linalg.norm(problem.weight * problem.prepared.stacked("a")))
     return most < (1 - POLICY.half) * float(np.linalg.norm(tau))
 
@@ -295,7 +295,7 @@ def _within(inertia: Number) -> float:
 
 
 def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
-    one = _inertia_of(numbers)
+    one = _number(numbers)
     if not one.is_determined:
         what = "mass" if linear else "inertia"
         raise InputError(
@@ -308,12 +308,12 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
 
 def _notes(numbers: Sequence[Number], explained: float) -> list[str]:
     notes = []
-    inertia = _inertia_of(numbers)
+    inertia = _number(numbers)
     if not inertia.is_determined:
         said = f"{_within(inertia):.3g} {inertia.unit} is taken (95 %: at most {inertia.range[1]:.3g})"
         notes.append(f"The recordings hardly show the inertia: {said}. --card with the true one is better.")
     for name, words in (("friction.Fc", "Coulomb friction"), ("friction.sigma2", "viscous friction")):
-        if not next(one for one in numbers if one.name == name).is_determined:
+        if not _number(numbers, name).is_determined:
             notes.append(f"The recordings do not determine the {words}; the card has none.")
     if explained < POLICY.half:
         notes.append(

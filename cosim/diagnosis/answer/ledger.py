@@ -112,17 +112,17 @@ class Trial:
 
     def as_json(self) -> JsonObject:
         """Plain data: a row of `ledger` in diagnosis.json."""
-        held, behind = self.heldout, self.behind
+        gains: JsonObject = {}
+        for name, one in (("train", self.train), ("heldout", self.heldout), ("behind", self.behind)):
+            gains |= {
+                f"nats_{name}": _short(one.nats) if one else None,
+                f"se_{name}": _short(one.error) if one else None,
+            }
         return {
             "effects": list(self.effects),
             "effect": self.effect,
             "numbers": {name: _short(value) for name, value in self.numbers.items()},
-            "nats_train": _short(self.train.nats),
-            "se_train": _short(self.train.error),
-            "nats_heldout": _short(held.nats) if held else None,
-            "se_heldout": _short(held.error) if held else None,
-            "nats_behind": _short(behind.nats) if behind else None,
-            "se_behind": _short(behind.error) if behind else None,
+            **gains,
             "share": _short(self.share),
             "rules": [rule.as_json() for rule in self.rules],
         }

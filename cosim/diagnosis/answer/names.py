@@ -31,22 +31,40 @@ def with_short_names(found: Diagnosis) -> Diagnosis:
     short = _short([*known, *(one.name for one in found.findings)])
     if not short:
         return found
+
+    def all_of(names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(short.get(name, name) for name in names)
+
+    def in_text(text: str) -> str:  # a name may have spaces, as columns have; it is the only one of its id
+        for name, own in short.items():
+            text = text.replace(name, own)
+        return text
+
+    def of_trial(one: Trial) -> Trial:
+        rules = tuple(replace(rule, name=in_text(rule.name)) for rule in one.rules)
+        return replace(one, effects=all_of(one.effects), effect=short.get(one.effect, one.effect), rules=rules)
+
+    def of_scores(one: EffectScores) -> EffectScores:
+        margins, explains = (
+            dict(zip(all_of(some), some.values(), strict=True)) for some in (one.margins, one.explains)
+        )
+        return replace(one, effect=short.get(one.effect, one.effect), margins=margins, explains=explains)
+
     findings = [
         replace(one, alone=True, title=one.title.removesuffix(f" ({one.source})")) if one.name in short else one
         for one in found.findings
     ]
-    scores = found.scores
-    plan = found.next_experiment.copy()
+    scores, plan = found.scores, found.next_experiment.copy()
     if "separates" in plan:
-        plan["separates"] = [short.get(name, name) for name in plan["separates"]]
+        plan["separates"] = list(all_of(plan["separates"]))
     return replace(
         found,
         findings=tuple(findings),
-        delivered=tuple(short.get(name, name) for name in found.delivered),
-        ambiguous_with=tuple(tuple(short.get(name, name) for name in group) for group in found.ambiguous_with),
+        delivered=all_of(found.delivered),
+        ambiguous_with=tuple(map(all_of, found.ambiguous_with)),
         next_experiment=plan,
-        ledger=tuple(_trial(one, short) for one in found.ledger),
-        scores=replace(scores, effects=[_scores(one, short) for one in scores.effects]) if scores else None,
+        ledger=tuple(map(of_trial, found.ledger)),
+        scores=replace(scores, effects=list(map(of_scores, scores.effects))) if scores else None,
     )
 
 
@@ -56,23 +74,3 @@ def _short(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         groups.setdefault(id_of(name), set()).add(name)
     return {name: one for one, (name, *others) in groups.items() if ":" in name and not others}
-
-
-def _trial(trial: Trial, short: Mapping[str, str]) -> Trial:
-    rules = tuple(replace(rule, name=_shortened(rule.name, short)) for rule in trial.rules)
-    effects = tuple(short.get(name, name) for name in trial.effects)
-    return replace(trial, effects=effects, effect=short.get(trial.effect, trial.effect), rules=rules)
-
-
-def _shortened(text: str, short: Mapping[str, str]) -> str:
-    """A rule's name, in which a name may have spaces, as columns have; it is the only one of its id."""
-    for name, own in short.items():
-        text = text.replace(name, own)
-    return text
-
-
-def _scores(one: EffectScores, short: Mapping[str, str]) -> EffectScores:
-    margins, explains = (
-        {short.get(name, name): value for name, value in values.items()} for values in (one.margins, one.explains)
-    )
-    return replace(one, effect=short.get(one.effect, one.effect), margins=margins, explains=explains)

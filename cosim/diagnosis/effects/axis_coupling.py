@@ -70,7 +70,6 @@ class NeighbouringAxis(Hypothesis[Neighbouring]):
         return next(fits[form] for form in self.forms if worth.get(form, -inf) >= least)
 
     def _single(self, problem: Problem, found: Fit, start: Neighbouring, evidence: Evidence) -> dict[Form, Fit]:
-        """Fits of each form that one neighbour may have."""
         one = next((one for one in problem.prepared.neighbours if one.name == start.neighbour), None)
         fits: dict[Form, Fit] = {type(start): found}
         fitted: Any = found.mount.effects[-1]
@@ -127,7 +126,6 @@ def _pairs(several: Sequence[Neighbour], mount: Mount) -> list[str]:
 
 
 def _hung_on(pair: str) -> Iterator[Candidate]:
-    """Weights that may hang on two neighbours."""
     for turns in TURNS:
         yield wave(_chain(pair, turns, 0.0, 0.0))
     yield sized(SpaceCoupling(neighbour=pair), names=PRODUCTS)
@@ -139,7 +137,6 @@ def _chain(pair: str, turns: tuple[float, float], weight: float, phase: float) -
 
 
 def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
-    """What one neighbour may do."""
     yield sized(AxisCoupling(neighbour=one.name))
     yield sized(DampedCoupling(damping=0.0, neighbour=one.name), names=("inertia", "damping"))
     for follows in FOLLOWS if _both_turn(one, mount) else ():

@@ -164,7 +164,6 @@ def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
 
 
 def _apart(ends: Sequence[Fit], evidence: Evidence) -> list[Fit]:
-    """Fits that ended at different gaps, the best first."""
     found: list[Fit] = []
     for one in sorted(ends, key=evidence, reverse=True):
         gap, *others = (float(cast(Any, fit.mount.effects[-1]).gap_rad) for fit in (one, *found))

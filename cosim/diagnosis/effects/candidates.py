@@ -171,7 +171,6 @@ def _group(candidate: Candidate) -> str:
 
 
 def _derivatives(mount: Mount, found: Sequence[Candidate], prepared: Prepared) -> list[Array]:
-    """Derivatives of the needed torque by the linear numbers of candidates."""
     instances = [instance for candidate in found for instance in candidate.instances]
     extended = replace(mount, effects=(*mount.effects, *instances))
     labels = iter(list(extended.components())[2 + len(mount.effects) :])

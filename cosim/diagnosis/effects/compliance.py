@@ -36,8 +36,6 @@ SMALL_MASS = 0.1
 
 
 class _AnySpring(Hypothesis[Form]):
-    """What both have in common."""
-
     easiest: ClassVar[int] = -1
     must_stand_out: ClassVar[bool] = True
     view = "spectrum"

@@ -92,7 +92,6 @@ def _above(pieces: Sequence[Piece], narrow: float, signals: Sequence[Array]) -> 
 
 
 def _cross_validated(torque: Array, columns: Array, parts: npt.NDArray[np.int64]) -> Array:
-    """What a fit to all other parts leaves of each."""
     left = torque.copy()
     for part in np.unique(parts):
         own = parts == part

@@ -149,7 +149,7 @@ class Comparison(OnBands):
             grams = self._grown(grams, own, aside, self._kept(missed, lambda: self.bands.transform(missed.columns)))
             groups = [*groups, *(Group(first + np.array(one), self.policy.misfit) for one in missed.groups)]
         rows = self.bands.of_forms if few else self.bands.effective
-        return marginal(grams, self._free(found, grams), groups, self.bands.count, rows, self.floor)
+        return marginal(grams, self.free(found, grams.shape[1] - 1), groups, self.bands.count, rows, self.floor)
 
     def enter(self, effect: str, found: Fit, share: float) -> None:
         """Enter a structure into the ledger, looked at for one of its effects that removes this share of the energy."""
@@ -187,8 +187,9 @@ class Comparison(OnBands):
             self._blocks_known[found] = self.bands.energy_by_block(left, weighed.noise, blocks)
         return self._blocks_known[found]
 
-    def _free(self, found: Fit, grams: Array) -> Array:
-        free = np.ones(grams.shape[1] - 1)
+    def free(self, found: Fit, count: int) -> Array:
+        """Prior sizes of so many columns, the first of which are the tangents of a structure."""
+        free = np.ones(count)
         free[: len(found.free)] = trust(found, self.problem.prepared.reach)
         return free
 
@@ -266,7 +267,7 @@ class Comparison(OnBands):
 
     def _ready(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group], Array, Marginal]:
         grams, placed = self._joined(found, own, aside)
-        free, bands = self._free(found, grams), self.bands
+        free, bands = self.free(found, grams.shape[1] - 1), self.bands
         return grams, placed, free, marginal(grams, free, placed, bands.count, bands.effective, self.floor)
 
     def group(self, found: Fit, columns: Array) -> tuple[float, Array]:
@@ -278,7 +279,7 @@ class Comparison(OnBands):
         own, missed, policy = self._own(found), self.missed_by(found), self.policy
         grams, placed = self._joined(found, own, NONE)
         level = rms(self.nuisances.level) or float(np.std(self.problem.prepared.stacked("tau")))
-        added, free = self.bands.transform(columns * level), self._free(found, grams)
+        added, free = self.bands.transform(columns * level), self.free(found, grams.shape[1] - 1)
         if missed:
             added = np.column_stack([self._kept(missed, lambda: self.bands.transform(missed.columns)), added])
             placed = [*placed, *(Group(len(free) + np.array(one), policy.misfit) for one in missed.groups)]

@@ -180,7 +180,6 @@ def _parts(prepared: Prepared, residual: Array) -> Iterator[tuple[Piece, Array, 
 
 
 def _in_band(piece: Piece, column: Array, band: tuple[float, float]) -> Array:
-    """What a column of a piece holds between two frequencies."""
     wave = dct(column, norm="ortho")
     hertz = np.arange(len(column)) / (2 * len(column) * piece.dt * piece.stride)
     return np.asarray(idct(np.where((hertz >= band[0]) & (hertz < band[1]), wave, 0.0), norm="ortho"))

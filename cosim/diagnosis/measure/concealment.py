@@ -27,7 +27,6 @@ from cosim.diagnosis.search.admissibility import is_degenerate, needs_turns
 from cosim.diagnosis.search.stages import least
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
-from cosim.estimation.priors import trust
 from cosim.estimation.problem import Problem
 from cosim.support.statistics import column_rms, rms
 from pyfmi_models.effects import Effect
@@ -127,9 +126,7 @@ class Concealment:
         return self._before[key]
 
     def _marginal(self, grams: Array, rows: Any, groups: list[Group], prior: Array, start: Marginal | None) -> Marginal:
-        bands, found = self._comparison.bands, self._found
-        free = np.ones(len(rows) - 1)
-        free[: len(found.free)] = trust(found, self._comparison.problem.prepared.reach)
+        bands, free = self._comparison.bands, self._comparison.free(self._found, len(rows) - 1)
         free[len(free) - len(prior) :] = prior
         chosen = grams[:, rows][:, :, rows]
         rounds = {} if start is None else {"rounds": ROUNDS // 2}  # noise and sizes start from the recordings' own
@@ -243,7 +240,6 @@ def _directions(one: Candidate, count: int) -> tuple[Array, ...]:
 
 
 def _tones(prepared: Prepared, tones: Sequence[Candidate], torque: float, many: dict[str, int]) -> Iterator[Member]:
-    """Tones, each with two sets of phases."""
     draw, pieces = np.random.default_rng(0), len(prepared.pieces)
     for one in tones:
         instance = one.instances[0]

@@ -75,15 +75,8 @@ def weighed(
 def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside) -> tuple[float, float]:
     """Nats by which a structure gains by the numbers that were found beside an effect, without that effect.
 
-    Args:
-        comparison: what all comparisons share.
-        found: the structure with the effect.
-        current: the structure without it.
-        aside: nuisances that stand aside for the effect.
-
-    Returns:
-        At least 0; 0 where no number of the base is further from the card than without the effect, by more than `FAR`.
-        The second one counts the few ways in which an equation may be wrong, as a contest of names does.
+    At least 0; 0 where no number of the base is further from the card than without the effect, by more than `FAR`. The
+    second one counts the few ways in which an equation may be wrong, as a contest of names does.
     """
     known, moved = current.parameters(), found.parameters()
     card = {variable.name: variable.start for variable in comparison.problem.mount.parameters()}

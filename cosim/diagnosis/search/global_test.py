@@ -21,7 +21,6 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.marginal import marginal
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
-from cosim.estimation.priors import trust
 from cosim.support.statistics import column_rms, rms
 
 DRAWS = 199
@@ -74,8 +73,7 @@ class Scores:
         """Weight of each band's rows, and standard deviations of what is known, as the evidence has them."""
         bands, many = comparison.bands, base.slopes.shape[1]
         groups = comparison.nuisances.groups_at(many)
-        free = np.ones(transformed.shape[1] - 1)
-        free[: len(base.free)] = trust(base, comparison.problem.prepared.reach)
+        free = comparison.free(base, transformed.shape[1] - 1)
         now = marginal(bands.grams(transformed), free, groups, bands.count, bands.effective, comparison.floor)
         for group, size in zip(groups, now.sizes, strict=True):
             free[group.columns] = max(float(size), 1e-6 * group.prior)

@@ -127,7 +127,6 @@ def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
 
 
 def _least(parts: Sequence[Crossed], noise: Sequence[Array], form: type[Drive], fitted: float) -> float:
-    """Chi-squared at the best time of a drive."""
     from scipy.optimize import minimize_scalar  # a tenth of a second that most diagnoses do not need
 
     values = [_chi2(parts, noise, form, share * fitted) for share in GRID]

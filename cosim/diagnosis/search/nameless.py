@@ -170,7 +170,6 @@ def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -
 
 
 def _worth(grams: Grams, chosen: Iterable[int]) -> float:
-    """Log-likelihood of a structure with some terms."""
     return grams.marginal(sorted(chosen), list(range(grams.recordings))).log_likelihood
 
 

@@ -200,7 +200,6 @@ class Validation:
         return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), LESS)
 
     def _gain(self, chosen: Fit, one: AcceptedEffect, standing: Sequence[AcceptedEffect]) -> Gain:
-        """What the held-out recordings lose without an effect."""
         problem, without = self.comparison.problem, one.without
         if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
             without = problem.without(chosen, one.effect.name)

@@ -276,7 +276,6 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
 
 
 def _names(found: Fit) -> tuple[str, ...]:
-    """Which effects a structure holds."""
     return tuple(sorted(effect.name for effect in found.mount.effects))
 
 

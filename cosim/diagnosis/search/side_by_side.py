@@ -31,10 +31,7 @@ class SideBySide(InTurn):
     """Refits here and in a process of its own, which is ended with the context.
 
     It has as many threads of linear algebra as this one (`cosim.support.threads`): sums over more differ in their last
-    digit.
-
-    Args:
-        on_progress: told, in a few words, what is being refitted here.
+    digit. `on_progress` is told, in a few words, what is being refitted here.
     """
 
     def __init__(self, on_progress: OnProgress = lambda _: None) -> None:

@@ -39,11 +39,7 @@ Start = tuple[Effect, int]
 
 
 class InTurn:
-    """The refits of a stage, one after the other; a context, after which none comes.
-
-    Args:
-        on_progress: told, in a few words, what is being refitted.
-    """
+    """The refits of a stage, one after the other, of which `on_progress` is told; a context, after which none comes."""
 
     def __init__(self, on_progress: OnProgress = lambda _: None) -> None:
         self.on_progress = on_progress

@@ -76,7 +76,6 @@ def own_set_point(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str
 
 
 def _asks(name: str) -> bool:
-    """Whether a column is named for a motion that is asked for."""
     return is_named(name, "asked") and is_named(name, "position", "speed")
 
 
@@ -93,7 +92,6 @@ def _motion(prepared: Prepared) -> Array:
 
 
 def _energy_left(columns: Array, tau: Array) -> float:
-    """Energy of the torque that least squares leave."""
     scaled = columns / (column_rms(columns) + 1e-300)
     rest = tau - scaled @ np.linalg.lstsq(scaled, tau, rcond=1e-9)[0]
     return float(rest @ rest)

@@ -79,7 +79,6 @@ def begun(found: Sequence[Path]) -> list[Path]:
 
 
 def _path(grams: Grams, candidates: Sequence[int], found: Path) -> Path:
-    """A path as long as its terms gain."""
     for _ in range(1, MOST):
         gains = _gains(grams, candidates, found.order, _scores(grams, found.order))
         proven, large = _ranked(gains)
@@ -102,7 +101,6 @@ def _without_idle(grams: Grams, found: Path) -> Path:
 
 
 def _along(grams: Grams, order: Sequence[int]) -> Path:
-    """The path of these terms in this order."""
     found = Path()
     for one in order:
         found = found.longer(one, *_gains(grams, [one], found.order, _scores(grams, found.order))[one])
@@ -112,7 +110,6 @@ def _along(grams: Grams, order: Sequence[int]) -> Path:
 def _gains(
     grams: Grams, candidates: Sequence[int], chosen: tuple[int, ...], now: tuple[float, float]
 ) -> dict[int, tuple[float, float]]:
-    """Evidence and predicted nats of each further term."""
     scores = {one: _scores(grams, (*chosen, one)) for one in candidates if one not in chosen}
     return {one: (here - now[0], there - now[1]) for one, (here, there) in scores.items()}
 

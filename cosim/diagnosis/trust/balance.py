@@ -177,7 +177,6 @@ class Balance:
 
     @cached_property
     def _starts(self) -> npt.NDArray[np.int64]:
-        """First rows of the blocks."""
         pieces = self.prepared.pieces
         number = np.repeat(np.arange(len(pieces)), [len(piece.kept) for piece in pieces])
         block = np.floor(self._rows("t") / BLOCK)

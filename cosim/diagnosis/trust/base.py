@@ -56,7 +56,6 @@ def base_far_from_card(
 def _far(
     name: str, words: str, causes: str, card: Variable, value: float, bounds: tuple[float, float] | None
 ) -> list[str]:
-    """One sentence, or none."""
     side = {"positive": " forward", "negative": " backward"}.get(name.rsplit(".", 1)[-1], "")
     numbers = f"{card.start:.3g} → {value:.3g} {raised(card.unit)}"
     if bounds and ended_at(value, card.start, bounds) is not None:
@@ -89,10 +88,7 @@ _TORQUES = ("friction.Fc", "friction.sigma2")
 def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[Sanity, ...]:
     """Say of a load off the axis that the refitted base turns it into another one.
 
-    Args:
-        card: the base as delivered.
-        refitted: the same structure with fitted numbers.
-        positions: where the axis was recorded [rad]: two loads that pull alike there are the same load.
+    Two loads that pull alike at the positions that were recorded [rad] are the same load.
     """
     before, after = (dict(mount.of_kind(GravityUnbalance)) for mount in (card, refitted))
     both = [(load, after[name]) for name, load in before.items() if name in after]
@@ -109,7 +105,6 @@ def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[
 
 
 def _pull(load: GravityUnbalance, positions: Array) -> Array:
-    """Torque of a load [N m]."""
     return np.asarray(float(load.mgl) * np.sin(positions + float(load.phase)))
 
 

@@ -157,6 +157,5 @@ class _Rest:
 
 
 def _basis(columns: Array) -> Array:
-    """Orthonormal columns that span those given."""
     vectors, sizes, _ = np.linalg.svd(columns / (column_rms(columns) + 1e-300), full_matrices=False)
     return np.asarray(vectors[:, sizes > 1e-6 * sizes[0]])

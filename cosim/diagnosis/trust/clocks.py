@@ -143,6 +143,5 @@ def _misfit(balance: Balance) -> _Left:
 
 
 def _likelihood(balance: Balance, left: _Left) -> Array:
-    """Log-likelihood of each lag."""
     rows = left.share * balance.solution(balance.own_order).independent * left.explained
     return np.asarray(-0.5 * rows * np.log(left.energy + left.share * balance.overlooked))

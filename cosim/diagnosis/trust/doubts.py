@@ -115,12 +115,8 @@ def without_denied(sanity: Sequence[Sanity], chosen: Fit, beside: Stage) -> tupl
     """Leave out that position and torque are not of one time, where the model that stands wants no such lag.
 
     A ripple over the position, a shaking ground or friction that creeps look late to a balance of inertia, friction and
-    load. The model knows more: beside its effects, what is late is of that size or is not there.
-
-    Args:
-        sanity: what is doubted.
-        chosen: the structure that stands.
-        beside: what was tried beside it.
+    load. The model knows more: beside its effects, what is late is of that size or is not there. `beside` is what was
+    tried beside it.
     """
     gained = [one for one in beside.tried if one.evidence > 0 and hypothesis_of(one.effect).is_timing]
     timing = [one for one in chosen.mount.effects if hypothesis_of(one).is_timing]
