@@ -56,17 +56,10 @@ def ranked(trials: Sequence[Trial]) -> list[Ranked]:
 
 
 def _row(one: Trial, weight: float) -> Ranked:
-    held, behind, refused = one.heldout, one.behind, one.refused_by
-    return Ranked(
-        label(one.effects),
-        one.train.nats,
-        behind.nats if behind else None,
-        behind.error if behind else None,
-        weight,
-        held.nats if held else None,
-        held.error if held else None,
-        sentence(refused) if refused else "",
-    )
+    pairs = ((gain.nats, gain.error) if gain else (None, None) for gain in (one.behind, one.heldout))
+    (behind, error), (held, held_error) = pairs
+    refused = sentence(one.refused_by) if one.refused_by else ""
+    return Ranked(label(one.effects), one.train.nats, behind, error, weight, held, held_error, refused)
 
 
 def label(effects: Sequence[str]) -> str:

@@ -61,18 +61,13 @@ def decide(scores: Scores, policy: Policy) -> Decision:
     Pure: scores that were stored are decided again in less than a millisecond, by this policy or another. Names with
     which the model is worse on the held-out recordings are possible, no more: half of their probability is left.
     """
-    found = _decided(scores, policy)
-    return found if scores.improves else found.with_share(policy.half)
-
-
-def _decided(scores: Scores, policy: Policy) -> Decision:
     rest, learned = beyond_any_machine(scores.rest, policy), scores.learned
-    found = _of_rest(scores.effects, rest, policy)
-    if found.is_unknown or not learned or not _says_unknown(learned, least_left(scores.effects, policy), policy):
-        return found
-    if set(learned.quantities) <= {term.name for term in scores.rest.terms} - {term.name for term in rest.terms}:
-        return found
-    return beside_rest(scores.effects, learned.quantities, policy, rest.changes)
+    found, least = _of_rest(scores.effects, rest, policy), least_left(scores.effects, policy)
+    if not found.is_unknown and learned and _says_unknown(learned, least, policy):
+        slight = {term.name for term in scores.rest.terms} - {term.name for term in rest.terms}
+        if not set(learned.quantities) <= slight:
+            found = beside_rest(scores.effects, learned.quantities, policy, rest.changes)
+    return found if scores.improves else found.with_share(policy.half)
 
 
 def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
@@ -109,7 +104,9 @@ def beside_rest(
     a time: no term but the name has the load that came.
     """
     weighed = [one.with_margins_of(policy.fair / policy.clear) for one in effects]
-    weak = leave_much(effects, policy)
+    # Those leave too much to be sure: a part of one cause may look like them. What is only an imitation a term without
+    # a name does nearly as well.
+    weak = [one for one in effects if max(one.explains[one.effect], one.removes) < policy.nearly_all]
     doubtful = tuple(one.effect for one in weak if changes or one.ahead < policy.clear)
     shares = {one.effect: policy.true_beside_unknown if one.effect in doubtful else policy.true_ahead for one in weak}
     return _named(weighed, policy).with_rest(follows, shares, doubtful)
@@ -118,14 +115,6 @@ def beside_rest(
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     sets = {one.effect: open_rivals(one, policy) for one in effects}
     return Decision(sets, {one.effect: _probabilities(one, sets[one.effect], policy) for one in effects}, False, ())
-
-
-def leave_much(effects: Sequence[EffectScores], policy: Policy) -> list[EffectScores]:
-    """Names that leave too much to be sure where that has no name: a part of one cause may look like them.
-
-    What is only an imitation a term without a name does nearly as well (`EffectScores.ahead`).
-    """
-    return [one for one in effects if max(one.explains[one.effect], one.removes) < policy.nearly_all]
 
 
 def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

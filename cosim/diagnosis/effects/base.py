@@ -1,23 +1,8 @@
 """The contract of a hypothesis: an effect as a question to recordings, and all that a diagnosis must know to ask it.
 
 The physics is in `pyfmi_models/effects`: equation, parameters with units and bounds, what the effect is called. Here
-stands, one file an effect, what only a diagnosis asks. In the order in which it is asked:
-
-    may_come(mount)                whether a mount may have the effect beside what it has
-    candidates(mount, span)        what is worth trying, given what the recordings visit
-    twins(effect)                  effects that must be tried where this one is
-    renamed(effect, mount)         the same under this name, where no recording tells two names apart
-    tuned(problem, found, ...)     what its grid knows only roughly, fitted
-    multiple(effect, k)            a further wave of a ripple
-    is_plausible(effect, mount)    whether the fitted effect is what its name says
-    shows(effect, mount, prepared) whether the motion tells it from another law of friction
-    is_degenerate(problem, effect) whether fitted numbers are another effect's, or none's
-    way_back(effect, mount)        how far motion must turn back to show it
-    where(effect, reach)           where it acts, within what was visited
-    concealed(mount, span, tried)  what is concealed in recordings to test how small it may be and still be seen
-    looked(seen, mount)            for what the bound that this gives holds
-    is_settled(mount)              whether no recording can test it: the model has it, or the axis cannot have it
-    why_not(mount, prepared)       why these recordings cannot test it, in one reason
+stands, one file an effect, what only a diagnosis asks: what is worth trying, how its numbers are fitted, whether they
+are what the name says, where it acts, how small it may be and still be seen, and why recordings cannot test it.
 
 Hypotheses are stateless; a new one is a new file in this folder, and nothing else is edited.
 """

@@ -40,16 +40,12 @@ LOOK = 12
 
 
 def in_band(train: Sequence[Recording], mount: Mount) -> Prepared:
-    """Prepare recordings of training in their band."""
+    """Prepare recordings of training in their band, the motion in that in which the refitted base leaves least."""
     inertia = float(mount.axis.inertia)
     narrow, wide = choose_cutoff(train, inertia), choose_cutoff(train, inertia, NOISE_LIMIT)
     prepared = prepare(train, wide)
     shown = wide > narrow and prepared.has_position and predicted(prepared, mount, narrow) > POLICY.considerable
-    return with_motion_read(train, mount, prepared if shown else prepare(train, narrow))
-
-
-def with_motion_read(train: Sequence[Recording], mount: Mount, prepared: Prepared) -> Prepared:
-    """The same in the band of the motion in which the refitted base leaves least."""
+    prepared = prepared if shown else prepare(train, narrow)
     best, (base, least) = prepared, _left_by_base(mount, mount, prepared)
     for times in MOTION:
         wider = prepare(train, Band(prepared.cutoff, times * prepared.cutoff))

@@ -73,18 +73,10 @@ class Predictive(OnBands):
         weight = weights(base.mount.friction, prepared)
         scale = comparison.noise.at(prepared.stacked("v"))
         bands = Bands.of(prepared, weight, scale, comparison.policy)
-        floor = bands.least_noise(prepared, comparison.inertia, comparison.policy)
-        return cls(
-            prepared,
-            weight,
-            bands,
-            _moved(discrepancy(base.mount, prepared, comparison.policy), base, prepared, comparison.policy),
-            floor,
-            comparison.policy.half,
-            protocol,
-            comparison.problem,
-            base.free,
-        )
+        policy, problem = comparison.policy, comparison.problem
+        floor = bands.least_noise(prepared, comparison.inertia, policy)
+        nuisances = _moved(discrepancy(base.mount, prepared, policy), base, prepared, policy)
+        return cls(prepared, weight, bands, nuisances, floor, policy.half, protocol, problem, base.free)
 
     def as_delivered(self) -> "Predictive":
         """The same with the base's numbers as they are: what is delivered as a model must predict with them."""

@@ -144,17 +144,10 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
     own = [found.residual[:, None], found.slopes, comparison.nuisances.columns]
     parts, plain, count = _by_recording(comparison, [*own, *columns], [*(np.ones(one.shape[1]) for one in own), *unit])
     groups = tuple(comparison.nuisances.groups_at(int(edges[1])))
-    return Grams(
-        parts,
-        plain,
-        count,
-        comparison.policy.coarsening,
-        comparison.floor,
-        trust(found, comparison.problem.prepared.reach),
-        groups,
-        tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:])),
-        np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0),
-    )
+    sizes, coarsening = trust(found, comparison.problem.prepared.reach), comparison.policy.coarsening
+    places = tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:]))
+    units = np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0)
+    return Grams(parts, plain, count, coarsening, comparison.floor, sizes, groups, places, units)
 
 
 def _by_recording(

@@ -32,7 +32,16 @@ def doubts(train: Sequence[Recording], heldout: Sequence[Recording], card: Card)
     Raises:
         RecordingError: a unit is wrong beyond doubt; the message names the option that puts it right.
     """
-    reference = _reference(card, [*train, *heldout])
+    mount, controller = card.plant(), card.controller
+    level = getattr(mount.friction, "Fc", None)
+    reference = Reference(
+        inertia=float(mount.axis.inertia),
+        coulomb=float(np.mean(level)) if level is not None else None,
+        torque_limit=float(mount.axis.torque_limit),
+        record_hz=float(controller.record_hz) if controller else None,
+        linear=mount.motion == "linear",
+        is_of_recordings=is_estimated(card, [one.name for one in (*train, *heldout)]),
+    )
     found = judged(train, heldout, reference)
     if not found:
         balances = [Balance([one], reference.linear) for one in (*train, *heldout)]
@@ -53,19 +62,6 @@ def is_estimated(card: Card, names: Sequence[str]) -> bool:
     """Whether a card was estimated from some recordings of these names, or a part of one: it is no witness of them."""
     given = card.origin.get("recordings", ()) if "estimated_by" in card.origin else ()
     return any(name == one or name.startswith(f"{one} (") for name in names for one in given)
-
-
-def _reference(card: Card, recordings: Sequence[Recording]) -> Reference:
-    mount, controller = card.plant(), card.controller
-    level = getattr(mount.friction, "Fc", None)
-    return Reference(
-        inertia=float(mount.axis.inertia),
-        coulomb=float(np.mean(level)) if level is not None else None,
-        torque_limit=float(mount.axis.torque_limit),
-        record_hz=float(controller.record_hz) if controller else None,
-        linear=mount.motion == "linear",
-        is_of_recordings=is_estimated(card, [one.name for one in recordings]),
-    )
 
 
 def of_base(
