@@ -11,7 +11,7 @@ from wandering import axis, recorded, swing
 from cosim.data.recording import Recording
 from cosim.diagnosis.trust.admission import check_recordings
 from cosim.diagnosis.trust.balance import Balance
-from cosim.diagnosis.trust.base import base_far_from_card, load_far_from_card
+from cosim.diagnosis.trust.doubts import base_far_from_card, load_far_from_card
 from cosim.diagnosis.trust.explanations import RIGHT
 from cosim.diagnosis.trust.judgement import Judgement, judged
 from cosim.diagnosis.trust.likelihood import Reference

@@ -14,9 +14,8 @@ from wandering import recorded, swing
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.trust.balance import Balance
-from cosim.diagnosis.trust.base import other_machine
 from cosim.diagnosis.trust.clocks import clock_offset, clocks
-from cosim.diagnosis.trust.doubts import doubts
+from cosim.diagnosis.trust.doubts import doubts, other_machine
 from cosim.diagnosis.trust.judgement import Judgement, _groups, judged
 from cosim.diagnosis.trust.likelihood import Reference
 from cosim.support.errors import RecordingError
