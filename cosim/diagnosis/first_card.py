@@ -9,7 +9,7 @@ that matters; a diagnosis with the card looks for everything else. An inertia th
 taken from the balance with its neighbours'.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, isfinite, sqrt
 from typing import Literal
@@ -155,7 +155,15 @@ def inertia_with_neighbours(prepared: Prepared, turns: bool) -> tuple[float, flo
     Returns:
         Inertia and its standard error [kg m2, kg]; an infinite error where no neighbour moves or rows are too few.
     """
-    columns = np.column_stack([*_own(prepared, turns), *_others(prepared, turns)])
+    q, v = prepared.stacked("q"), prepared.stacked("v")
+    sign = np.tanh(v / (CLEAR_MOTION * np.abs(v).max() + 1e-300))
+    shapes = [prepared.stacked("a"), sign, v, np.ones_like(v), *(_weight(q) if turns else ())]
+    for one in prepared.neighbours:
+        shapes.append(prepared.of_neighbour(key(one.name, "acceleration")))
+        if turns and one.turns and one.position:
+            angle = prepared.of_neighbour(key(one.name, "position"))
+            shapes += [wave for together in (angle, q + angle, q - angle) for wave in _weight(together)]
+    columns = np.column_stack(shapes)
     rows, count = columns.shape
     if not prepared.neighbours or rows < LEAST_ROWS * count:
         return 0.0, np.inf
@@ -164,24 +172,6 @@ def inertia_with_neighbours(prepared: Prepared, turns: bool) -> tuple[float, flo
     value = np.linalg.lstsq(columns, tau, rcond=1e-9)[0]
     spread = covariance(columns, tau - columns @ value, Blocks.of(prepared))[0, 0]
     return float(value[0] / size[0]), sqrt(spread * rows / (rows - count)) / float(size[0])
-
-
-def _own(prepared: Prepared, turns: bool) -> Iterator[Array]:
-    """Shapes of this axis, the acceleration first."""
-    v = prepared.stacked("v")
-    yield from (prepared.stacked("a"), np.tanh(v / (CLEAR_MOTION * np.abs(v).max() + 1e-300)), v, np.ones_like(v))
-    yield from _weight(prepared.stacked("q")) if turns else ()
-
-
-def _others(prepared: Prepared, turns: bool) -> Iterator[Array]:
-    """Shapes of the neighbours that move by themselves."""
-    q = prepared.stacked("q")
-    for one in prepared.neighbours:
-        yield prepared.of_neighbour(key(one.name, "acceleration"))
-        if turns and one.turns and one.position:
-            angle = prepared.of_neighbour(key(one.name, "position"))
-            for together in (angle, q + angle, q - angle):
-                yield from _weight(together)
 
 
 def _weight(angle: Array) -> tuple[Array, Array]:

@@ -209,11 +209,7 @@ ACTION = "record at rest, with all around it off and on, and look for what shake
 def broadband_entry(found: Shaken, residual: Array, friction: float, motion: str) -> BroadbandEntry:
     """Describe a disturbance; its probability is that of an effect that removes as much of the residual energy.
 
-    Args:
-        found: the disturbance.
-        residual: what the model leaves of the held-out recordings [N m, N].
-        friction: RMS of the friction [N m, N].
-        motion: of the axis, rotary or linear.
+    `residual` is what the model leaves of the held-out recordings, `friction` the RMS of the friction [N m, N].
     """
     unit = "N" if motion == "linear" else "N·m"
     share = float(np.clip((found.level / max(rms(residual), 1e-300)) ** 2, 0.0, 1.0))

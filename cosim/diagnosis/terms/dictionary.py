@@ -3,18 +3,31 @@
 Smooth and general: waves over the position, speed, acceleration, time since the start and since the last reversal,
 long hysteresis, user columns, and products of those with the position. Acceleration and way travelled no moment tells:
 they are followed along the motion, as the plant's own states do (`learned_base.py`).
+
+Columns of the axis' own loop are no causes: its torque, asked for or read elsewhere, and its set point. A set point of
+the speed is a torque, too, where drag is all that an axis needs.
+
+A cause acts beside the axis' own inertia, friction and load, which it still needs. Beside its own torque it needs none
+of them: tau = k c + B b with B the motion (inertia, friction of either sign, drag, waves over the position), and what
+B explains beside c is small against what it explains alone. Torque then follows torque, which foretells nothing.
+
+A set point is what the axis follows: its motion (q, v, a) tells most of it. Such a column may still be a cause, as a
+neighbour that moves along; but in a loop tau = k (c - q) - d v, so with the set point, the position and the speed, B
+is needed half as much as with these two alone, and beside a cause as much as before. What is named for a set point
+needs no such proof, and what is named for the motion of a neighbour is none.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from cosim.data.roles import is_named
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.terms.own_torque import own_set_point, own_torque
 from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.estimation.row_weights import CLEAR_MOTION
 from cosim.estimation.rowwise import recurrence
 from cosim.support.statistics import ROUNDING, column_rms
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
@@ -23,6 +36,8 @@ FEW = 4
 """Waves over a column beside position and speed, whose range is seldom filled, and over positions in its products."""
 OF_LAW = ("speed", "rate of torque")
 """Terms that say nothing of the unknown: a friction law's own misfit, and time stamps a fraction of a sample off."""
+LOAD_WAVES = 3
+"""Waves of a load over the range of positions: a weight on half a turn, or a spring, is one and a half of them."""
 TURN = 5e-4
 """Share of the range of positions by which a motion must come back to count as reversed."""
 
@@ -221,3 +236,64 @@ def followed(name: str, piece: Piece) -> Array:
     middle = np.concatenate([[0.0], (piece.v[1:] + piece.v[:-1]) / 2])
     past = recurrence(np.full(len(middle), keep), (1 - keep) * middle[None])[0, 1:]
     return np.asarray((piece.v - past) / SEEN_WITHIN)
+
+
+def own_torque(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the names of the columns that are the torque of this axis again, though not in every sample.
+
+    `columns` are values of each at the kept rows, (rows,), low-passed as the torque is. No name where motion explains
+    hardly anything of the torque: then nothing tells them.
+    """
+    tau, motion = prepared.stacked("tau"), _motion(prepared)
+    level = np.ones((len(tau), 1))
+    alone, moved = _energy_left(level, tau), _energy_left(np.column_stack([level, motion]), tau)
+    if alone - moved <= POLICY.small * alone:
+        return ()
+
+    def is_torque(column: Array) -> bool:
+        beside = np.column_stack([level, column])
+        needed = _energy_left(beside, tau) - _energy_left(np.column_stack([beside, motion]), tau)
+        return needed < POLICY.small * (alone - moved)
+
+    return tuple(name for name, column in columns.items() if is_torque(column))
+
+
+def own_set_point(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the names of the columns that are the set point of this axis under another name; arguments as above."""
+    tau, motion = prepared.stacked("tau"), _motion(prepared)
+    state = np.column_stack([np.ones_like(tau), *(prepared.stacked(name) for name in "qv")])
+    moved = np.column_stack([state, prepared.stacked("a")])
+
+    def needed(beside: Array) -> float:
+        return _energy_left(beside, tau) - _energy_left(np.column_stack([beside, motion]), tau)
+
+    alone = needed(state)
+
+    def is_followed(column: Array) -> bool:
+        return _energy_left(moved, column) <= POLICY.half * _energy_left(state[:, :1], column)
+
+    def closes_loop(column: Array) -> bool:
+        return needed(np.column_stack([state, column])) <= POLICY.half * alone
+
+    theirs = {name for one in prepared.neighbours_recorded for name in (one.position, one.speed, one.acceleration)}
+    alike = {name: one for name, one in columns.items() if name not in theirs and is_followed(one)}
+    asks = {name for name in alike if is_named(name, "asked") and is_named(name, "position", "speed")}
+    return tuple(name for name, one in alike.items() if name in asks or closes_loop(one))
+
+
+def _motion(prepared: Prepared) -> Array:
+    """What an axis' own motion may ask of its torque, (rows, n)."""
+    v = prepared.stacked("v")
+    sign = np.tanh(v / (CLEAR_MOTION * np.abs(v).max() + 1e-300))
+    shapes = [prepared.stacked("a"), sign, v]
+    if prepared.has_position:
+        low, high = prepared.ranges["q"]
+        place = (prepared.stacked("q") - low) / (high - low)
+        shapes += [np.cos(np.pi * k * place) for k in range(1, LOAD_WAVES + 1)]
+    return np.column_stack(shapes)
+
+
+def _energy_left(columns: Array, tau: Array) -> float:
+    scaled = columns / (column_rms(columns) + 1e-300)
+    rest = tau - scaled @ np.linalg.lstsq(scaled, tau, rcond=1e-9)[0]
+    return float(rest @ rest)
