@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import exp, sqrt
 
 from cosim.diagnosis.answer.ledger import Rule
-from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import Policy
 
@@ -63,20 +63,12 @@ def decide(scores: Scores, policy: Policy) -> Decision:
     """
     rest, learned = beyond_any_machine(scores.rest, policy), scores.learned
     found, least = _of_rest(scores.effects, rest, policy), least_left(scores.effects, policy)
-    if not found.is_unknown and learned and _says_unknown(learned, least, policy):
+    if not found.is_unknown and learned and learned.is_sure and not learned.is_of_law:  # a law is no missing effect
         slight = {term.name for term in scores.rest.terms} - {term.name for term in rest.terms}
-        if not set(learned.quantities) <= slight:
+        enough = learned.removed >= policy.considerable and learned.evidence >= least
+        if enough and not set(learned.quantities) <= slight:
             found = beside_rest(scores.effects, learned.quantities, policy, rest.changes)
     return found if scores.improves else found.with_share(policy.half)
-
-
-def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
-    """Whether a learned term says alone that something has no name: sure, a large share of the rest, `least` nats.
-
-    Another friction law over speed is no missing effect.
-    """
-    enough = learned.removed >= policy.considerable and learned.evidence >= least
-    return learned.is_sure and enough and not learned.is_of_law
 
 
 def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:

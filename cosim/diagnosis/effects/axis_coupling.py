@@ -56,9 +56,14 @@ class NeighbouringAxis(Hypothesis[Neighbouring]):
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Each neighbour: its acceleration, with its speed, and the weight that turns with it; weights behind two."""
         for one in _free(span.prepared.neighbours, mount):
-            yield from _moved_by(one, mount)
+            yield sized(AxisCoupling(neighbour=one.name))
+            yield sized(DampedCoupling(damping=0.0, neighbour=one.name), names=("inertia", "damping"))
+            for follows in FOLLOWS if _both_turn(one, mount) else ():
+                yield wave(WeightCoupling(weight=0.0, follows=follows, neighbour=one.name))
         for pair in _pairs(span.prepared.neighbours, mount):
-            yield from _hung_on(pair)
+            for turns in TURNS:
+                yield wave(_chain(pair, turns, 0.0, 0.0))
+            yield sized(SpaceCoupling(neighbour=pair), names=PRODUCTS)
 
     def tuned(self, problem: Problem, found: Fit, start: Neighbouring, evidence: Evidence) -> Fit:
         """The simplest form that explains it: a damping or a weight only where it adds evidence to the inertia."""
@@ -125,22 +130,9 @@ def _pairs(several: Sequence[Neighbour], mount: Mount) -> list[str]:
     return [name for name in map(AND.join, combinations(turning, 2)) if not taken & {name, ""}]
 
 
-def _hung_on(pair: str) -> Iterator[Candidate]:
-    for turns in TURNS:
-        yield wave(_chain(pair, turns, 0.0, 0.0))
-    yield sized(SpaceCoupling(neighbour=pair), names=PRODUCTS)
-
-
 def _chain(pair: str, turns: tuple[float, float], weight: float, phase: float) -> ChainCoupling:
     own, other = turns
     return ChainCoupling(weight=weight, phase=phase, follows=own, follows_second=other, neighbour=pair)
-
-
-def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
-    yield sized(AxisCoupling(neighbour=one.name))
-    yield sized(DampedCoupling(damping=0.0, neighbour=one.name), names=("inertia", "damping"))
-    for follows in FOLLOWS if _both_turn(one, mount) else ():
-        yield wave(WeightCoupling(weight=0.0, follows=follows, neighbour=one.name))
 
 
 def _both_turn(one: Neighbour, mount: Mount) -> bool:

@@ -60,18 +60,22 @@ class Term:
 
 def dictionary(prepared: Prepared) -> dict[str, Term]:
     """What was recorded, by plain names."""
-    makers = {**_of_speed(prepared), **_of_time(prepared), **_of_columns(prepared)}
+    makers = {**_of_speed(prepared), **_waves_of("time since the start", _passed, prepared, 4), **_of_columns(prepared)}
     if prepared.has_position:
-        makers |= {**_of_position(prepared), **_of_reversals(prepared), **_products(prepared)}
+        of_place = _waves_of("position", _place(prepared), prepared, 8)
+        makers |= {**of_place, **_of_reversals(prepared), **_products(prepared)}
     return {name: Term(make, column_rms(made(prepared, make))) for name, make in makers.items()}
 
 
-def _of_position(prepared: Prepared) -> dict[str, Maker]:
-    sign, place = _sign(prepared), _place(prepared)
-    return {
-        "position": lambda p: _waves(place(p)),
-        "friction level over position": lambda p: [wave * sign(p) for wave in _waves(place(p))],
-    }
+def _waves_of(name: str, x: Column, prepared: Prepared, count: int) -> dict[str, Maker]:
+    """Waves over a quantity from 0 to 1, as a torque and as a friction level."""
+    sign = _sign(prepared)
+    by_level = {f"friction level over {name}": lambda p: [wave * sign(p) for wave in _waves(x(p), count)]}
+    return {name: lambda p: _waves(x(p), count), **by_level}
+
+
+def _passed(p: Piece) -> Array:
+    return np.asarray((p.t - p.t[0]) / (p.t[-1] - p.t[0]))
 
 
 def _of_speed(prepared: Prepared) -> dict[str, Maker]:
@@ -102,16 +106,6 @@ def _needed(prepared: Prepared) -> Column:
     rows = np.concatenate([columns(piece)[piece.kept] for piece in prepared.pieces])
     beta = np.linalg.lstsq(rows, prepared.stacked("tau"), rcond=1e-9)[0]
     return lambda p: np.asarray(columns(p) @ beta)
-
-
-def _of_time(prepared: Prepared) -> dict[str, Maker]:
-    sign = _sign(prepared)
-
-    def waves(p: Piece) -> list[Array]:
-        return _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4)
-
-    by_level = {"friction level over time since the start": lambda p: [wave * sign(p) for wave in waves(p)]}
-    return {"time since the start": waves, **by_level}
 
 
 def _of_reversals(prepared: Prepared) -> dict[str, Maker]:
@@ -214,7 +208,7 @@ def _place(prepared: Prepared) -> Column:
     return lambda p: np.asarray((p.q - low) / (high - low))
 
 
-def _waves(x: Array, count: int = 8) -> list[Array]:
+def _waves(x: Array, count: int) -> list[Array]:
     return [np.cos(np.pi * k * x) for k in range(1, count + 1)]
 
 

@@ -97,7 +97,11 @@ class _Left(NamedTuple):
 def clock_offset(balances: Sequence[Balance]) -> ClockOffset:
     """Find the lag of the position behind the torque that balances recordings best, with any friction."""
     lefts = [_misfit(one) for one in balances]
-    likelihood = np.sum([_likelihood(one, left) for one, left in zip(balances, lefts, strict=True)], axis=0)
+    likelihoods = []
+    for one, left in zip(balances, lefts, strict=True):
+        rows = left.share * one.solution(one.own_order).independent * left.explained
+        likelihoods.append(-0.5 * rows * np.log(left.energy + left.share * one.overlooked))
+    likelihood = np.sum(likelihoods, axis=0)
     near = LAGS[likelihood >= likelihood.max() - POLICY.fair]
     best, none = int(likelihood.argmax()), len(LAGS) // 2
     removed = [float(1 - one.energy[best] / one.energy[none]) for one in lefts if one.share] or [0.0]
@@ -140,8 +144,3 @@ def _misfit(balance: Balance) -> _Left:
     unseen = energy - (seen**2).sum(0)
     left = squares_left(triangle, seen, (0, 1, 2)) + unseen  # inertia, friction, viscosity
     return _Left(left, float(np.mean(inside)), max(0.0, 1 - float((left / energy).min())))
-
-
-def _likelihood(balance: Balance, left: _Left) -> Array:
-    rows = left.share * balance.solution(balance.own_order).independent * left.explained
-    return np.asarray(-0.5 * rows * np.log(left.energy + left.share * balance.overlooked))
