@@ -19,7 +19,7 @@ goes with a term of many shapes, and took a load's friction from two measured jo
 remains is asked again beside that term.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import inf, log
@@ -92,7 +92,11 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         known = [*offered.law, *found.terms]
         own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
         alone = [_challenge(comparison, found, (one,), own, offered) for one in found.proof.standing]
-        asked = [*alone, *_of_two(comparison, found, alone, own, offered)]
+        asked = list(alone)
+        for first, second in combinations(alone, 2):  # terms that nearly lead one of two names, in the place of both
+            near = {each.term.name: each.term for each in (first, second) if each.lead >= -comparison.policy.strong}
+            both = (*first.effects, *second.effects)
+            asked += [_challenge(comparison, found, both, own, offered, term) for term in near.values()]
         tried = [(*_held(comparison, found, one, held), one) for one in asked]
         holds, lead, worst = max(tried, key=lambda one: one[:2])
         leads = holds and lead >= least
@@ -152,16 +156,6 @@ def _challenge(
     kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
     best = max(range(len(terms)), key=lambda k: worth[k])
     return _Challenge(some, terms[best], worth[best] - log(len(found.terms) + len(further)) - kind, beside)
-
-
-def _of_two(
-    comparison: Comparison, found: Nameless, alone: Sequence[_Challenge], own: float, offered: _Offered
-) -> Iterator[_Challenge]:
-    """Terms that nearly lead one of two names, in the place of both."""
-    for one, other in combinations(alone, 2):
-        near = {each.term.name: each.term for each in (one, other) if each.lead >= -comparison.policy.strong}
-        for term in near.values():
-            yield _challenge(comparison, found, (*one.effects, *other.effects), own, offered, term)
 
 
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:

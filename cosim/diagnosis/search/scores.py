@@ -3,7 +3,7 @@
 What is left may follow smooth shapes of recorded quantities that are no effect of the catalogue.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
@@ -25,7 +25,6 @@ from cosim.diagnosis.terms.candidate_terms import LEVEL
 from cosim.diagnosis.terms.dictionary import OF_LAW, dictionary
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array
 from cosim.support.statistics import rms
 
 UNKNOWN = "unknown"
@@ -74,25 +73,20 @@ def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list
     here = set.intersection(*(set(piece.extras) for piece in comparison.problem.prepared.pieces)) - {"q_d", "v"}
     missing = {name for column in here - there for name in (column, f"position and {column}")}
     residual, weighted = held.residual(found.mount), held.slopes(found) * held.weight[:, None]
-    scored = []
+    counted, scored = comparison.problem.weight > 0, []
+    level = max(rms(comparison.nuisances.level[counted]), 1e-300)
     for name, term in dictionary(comparison.problem.prepared).items():
         if name in missing or name in OF_LAW:
             continue
         columns = term.columns(comparison.problem.prepared)
         evidence, beta = comparison.group(found, columns)
-        uneven = _uneven(comparison, columns @ beta) if name == LEVEL else None
+        uneven = rms((columns @ beta)[counted]) / level if name == LEVEL else None
         after = residual - term.columns(held.prepared) @ beta
         # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
         left = projected(np.column_stack([residual, after]) * held.weight[:, None], weighted)
         before, now = (left**2).sum(0)
         scored.append(TermScores(name, evidence, 1 - float(now) / max(float(before), 1e-300), uneven))
     return sorted(scored, key=lambda one: -one.evidence)
-
-
-def _uneven(comparison: Comparison, torque: Array) -> float:
-    """Torque of a term of the friction level, relative to that level, both RMS over the rows that count."""
-    counted = comparison.problem.weight > 0
-    return rms(torque[counted]) / max(rms(comparison.nuisances.level[counted]), 1e-300)
 
 
 def finished(comparison: Comparison, held: Predictive, chosen: Fit) -> tuple[Trial, ...]:
@@ -123,13 +117,10 @@ def enter_answer(
     for one in found:
         if one.where is not None:
             comparison.enter(one.name, chosen, one.gain)
-            comparison.judge(one.name, chosen, list(_answer_rules(one, improves)))
+            better = Rule("the model with the names is no worse on held-out recordings", improves)
+            alone = Rule("no rival left in its set, its size differs from none", one.answer == "found")
+            rules = [better, at_least("probability", one.probability, LIKELY), alone]
+            comparison.judge(one.name, chosen, rules)
     learned = [Rule(LEARNED, True)] if unknown and not any(rule.outcome for rule in rest) else []
     comparison.enter(UNKNOWN, chosen, 0.0)
     comparison.judge(UNKNOWN, chosen, [*rest, *learned])
-
-
-def _answer_rules(one: Finding, improves: bool) -> Iterator[Rule]:
-    yield Rule("the model with the names is no worse on held-out recordings", improves)
-    yield at_least("probability", one.probability, LIKELY)
-    yield Rule("no rival left in its set, its size differs from none", one.answer == "found")
