@@ -29,10 +29,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence import comparison
 from cosim.diagnosis.measure import bounds
-from cosim.diagnosis.search import global_test
+from cosim.diagnosis.search import global_test, scores
 from cosim.diagnosis.search import stages as search
 from cosim.diagnosis.search.stages import Start
-from cosim.diagnosis.terms import flexible
 from cosim.support.version import __version__
 from cosim_studies.proof.conduct import code
 from cosim_studies.proof.generator import ANY, FAMILIES, make_case, write_given
@@ -62,7 +61,7 @@ def left_out(effect: str) -> Iterator[None]:
         for module in (comparison, global_test, bounds):
             stack.enter_context(patch.object(module, "candidates", _less(module.candidates, effect)))
         stack.enter_context(patch.object(search, "starts", _no_twin(search.starts, effect)))
-        stack.enter_context(patch.object(flexible, "dictionary", _fewer(flexible.dictionary, effect)))
+        stack.enter_context(patch.object(scores, "dictionary", _fewer(scores.dictionary, effect)))
         yield
 
 

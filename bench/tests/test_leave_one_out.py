@@ -48,7 +48,7 @@ def test_the_shapes_that_are_left_out_are_in_the_dictionary() -> None:
     assert {name for terms in leave_one_out.SHAPES.values() for name in terms} <= set(dictionary(prepared))
     for effect, terms in leave_one_out.SHAPES.items():
         with leave_one_out.left_out(effect):
-            left = set(leave_one_out.flexible.dictionary(prepared))
+            left = set(leave_one_out.scores.dictionary(prepared))
         assert left == set(dictionary(prepared)) - set(terms)
 
 
