@@ -1,43 +1,24 @@
-"""Neighbouring axes act on this one: each that acts is named where its columns are there and it moves by itself."""
+"""A neighbouring axis acts on this one: it is named where its columns are there and it moves by itself."""
 
-import json
 import re
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 from problems import diagnosed
-from scipy.spatial.transform import Rotation
-from two_links import LEVER, OWN, TIP, WEIGHT, elbow, forearm, joint, tones, wrist
+from two_links import ELBOW, JOINT, LEVER, OWN, WEIGHT, elbow, joint, tones, wrist
 
-import cosim.delivery
-from cosim.api.why import Written
 from cosim.data.neighbours import Neighbour, neighbours
 from cosim.data.recording import Recording
-from cosim.delivery.deliver import as_json
 from cosim.diagnosis.answer.result import Diagnosis
-from cosim.diagnosis.answer.why import reasons
-from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.trust.admission import check_neighbours
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.neighbours import as_inputs, key
 from cosim.estimation.prepare import prepare
 from cosim.support.errors import RecordingError
-from cosim_investigation.questions import effect_of
 from pyfmi_models.card import CardError, parse_card
-from pyfmi_models.card_writer import card_text
-from pyfmi_models.effects.axis_coupling import PRODUCTS, ChainCoupling, SpaceCoupling, WeightCoupling
-from pyfmi_models.effects.base import Motion
+from pyfmi_models.effects.axis_coupling import ChainCoupling, SpaceCoupling, WeightCoupling
 from pyfmi_models.mount import Mount
-
-ELBOW, JOINT, WRIST = (
-    f'[mount]\ninertia = {inertia}\n[friction]\nmodel = "coulomb"\nFc = {level}\nsigma2 = {viscous}\n'
-    for inertia, level, viscous in ((0.064, 0.15, 0.08), (0.3, 0.5, 0.3), (0.06, 0.15, 0.08))
-)
-SCHEMA = Path(cosim.delivery.__file__).with_name("schema.json")
 
 
 def coupled(card: str, *keys: str) -> Mount:
@@ -48,10 +29,6 @@ def coupled(card: str, *keys: str) -> Mount:
 
 def of_elbow(neighbour: str, columns: bool = True) -> Diagnosis:
     return diagnosed([elbow(seed, neighbour, columns=columns) for seed in (1, 2, 3)], ELBOW).diagnosis
-
-
-def of_joint(acting: Mapping[int, tuple[float, float]], **more: float) -> Outcome:
-    return diagnosed([joint(seed, acting, **more) for seed in (1, 2, 3)], JOINT)
 
 
 def test_a_neighbour_whose_columns_are_there_is_named_with_its_inertia_and_its_weight() -> None:
@@ -188,28 +165,6 @@ def test_a_card_with_two_couplings_reads_two_inputs_and_needs_the_sum_of_their_t
     assert [float(one) for one in speeds] == pytest.approx([-0.2 / 0.3, -0.05 / 0.3])
 
 
-def test_each_neighbour_that_acts_is_found_with_its_own_size_and_delivered() -> None:
-    outcome = of_joint({1: (0.2, 1.5), 3: (0.05, 0.0)})
-    answer = outcome.diagnosis
-    named = {one.name: one for one in answer.findings if one.answer == "found"}
-    assert [*named] == ["axis_coupling:q1", "axis_coupling:q3"]
-    assert named["axis_coupling:q1"].parameters["inertia"] == pytest.approx(0.2, rel=0.02)
-    assert named["axis_coupling:q1"].parameters["weight"] == pytest.approx(1.5, rel=0.02)
-    assert named["axis_coupling:q3"].parameters == {"inertia": pytest.approx(0.05, rel=0.05)}
-    assert answer.heldout.after_rms < 0.05 * answer.heldout.before_rms
-    again = parse_card(card_text(outcome.card, ""), "card.toml").plant()
-    assert [one.name for one in again.effects] == [*named]
-
-    document = json.loads(json.dumps(as_json(answer)))
-    jsonschema.validate(document, json.loads(SCHEMA.read_text("utf-8")))
-    assert document["verdict"] == document["delivered"] == ["axis_coupling"]
-    (entry,) = (one for one in document["effects"] if one["effect"] == "axis_coupling")
-    assert (entry["neighbour"], [one["neighbour"] for one in entry["further"]]) == ("q1", ["q3"])
-    said = dict(reasons(document, answer.ledger))
-    assert "fitted together with axis_coupling:q1" in said["axis_coupling:q3"]
-    Written(document, answer.ledger).check("axis_coupling:q3")
-
-
 def test_what_the_equation_of_a_coupling_lacks_makes_no_other_neighbour_a_cause() -> None:
     runs = []
     for seed in (1, 2, 3):
@@ -218,80 +173,3 @@ def test_what_the_equation_of_a_coupling_lacks_makes_no_other_neighbour_a_cause(
         runs.append(Recording.of({**run.table, **idle}, run.name))
     answer = diagnosed(runs, ELBOW).diagnosis
     assert {one.source for one in answer.findings if one.effect == "axis_coupling" and one.parameters} == {"q1"}
-
-
-def test_neighbours_that_move_and_do_nothing_are_not_named() -> None:
-    answer = of_joint({}).diagnosis
-    assert answer.verdict == ()
-    assert [one.answer for one in answer.findings if one.effect == "axis_coupling"] == ["not_seen"]
-
-
-def test_one_of_several_that_acts_alone_has_its_id_for_its_name_whatever_its_column_is_called() -> None:
-    runs = []
-    for run in (joint(seed, {3: (0.1, 0.0)}) for seed in (1, 2, 3)):
-        speeds = {f"dq{k}": np.gradient(run[f"q{k}"], run.t) for k in (1, 2)}  # on speeds alone no weight hangs
-        own = {name: run[name] for name in ("t", "tau", "q")}
-        runs.append(Recording.of({**own, **speeds, "joint 3 position": run["q3"]}, run.name))
-    answer = diagnosed(runs, JOINT).diagnosis
-    (row,) = (one for one in answer.findings if one.answer == "found")
-    assert (row.name, row.title, row.source) == ("axis_coupling", "Axis coupling", "joint 3 position")
-    assert not any("axis_coupling:" in rule.name for one in answer.ledger for rule in one.rules)
-    assert {one.effect for one in answer.ledger if one.effect.startswith("axis")} == {"axis_coupling"}
-
-
-def test_of_two_that_move_in_proportion_one_is_named_and_the_other_said() -> None:
-    answer = of_joint({2: (0.2, 0.0)}, spare=0.0).diagnosis
-    (row,) = (one for one in answer.findings if one.answer == "found")
-    assert row.parameters == {"inertia": pytest.approx(0.2, rel=0.02)}
-    assert row.statement.endswith("of `q1`. It may as well be `q2`: `q1` moves in proportion to that.")
-
-
-def test_two_that_move_nearly_alike_are_a_set_where_no_evidence_separates_them() -> None:
-    answer = of_joint({1: (0.003, 0.0)}, spare=0.05, noise=0.2).diagnosis
-    assert [{*group} for group in answer.ambiguous_with] == [{"axis_coupling:q1", "axis_coupling:q2"}]
-
-
-def test_a_weight_behind_three_parallel_axes_has_its_size_and_delivers_a_card_that_reads_both() -> None:
-    outcome = diagnosed([wrist(seed, idle=1) for seed in (1, 2, 3)], WRIST)
-    named = {one.name: one for one in outcome.diagnosis.findings if one.answer == "found"}
-    assert next(iter(named)) == "axis_coupling:q1 + q2"
-    assert not [name for name in named if "q4" in name]
-    one, (_, mass, lever) = named["axis_coupling:q1 + q2"], TIP
-    assert one.parameters["weight"] == pytest.approx(mass * 9.81 * lever, rel=0.03)
-    assert one.parameters["phase"] == pytest.approx(0.0, abs=0.03)
-    assert (one.parameters["follows"], one.parameters["follows_second"]) == (1.0, 1.0)
-    assert one.statement.startswith("Two neighbouring axes act on this one: a weight of 1.1")
-    assert one.statement.endswith("that goes with the angle this axis + `q1` + `q2`.")
-    held = outcome.diagnosis.heldout
-    assert held.after_rms < 0.2 * held.before_rms
-
-    again, run = parse_card(card_text(outcome.card, ""), "card.toml").plant(), wrist(1)
-    assert {one.name for one in again.effects} == {*named}
-    check_neighbours(again, [run])
-    assert np.ptp(as_inputs(run, again, 15.0)["second_neighbour_position"] - run["q2"]) < 0.05 * np.ptp(run["q2"])
-    assert isinstance(effect_of(one), ChainCoupling)
-    assert effect_of(one).name == one.name
-
-
-def test_a_weight_on_axes_that_point_elsewhere_is_one_of_eight_products() -> None:
-    answer = diagnosed([forearm(seed) for seed in (1, 2, 3)], WRIST).diagnosis
-    first = next(one for one in answer.findings if one.answer == "found")
-    assert (first.name, {*first.parameters}) == ("axis_coupling:q1 + q2", {*PRODUCTS})
-    assert answer.heldout.after_rms < 0.25 * answer.heldout.before_rms
-
-
-def test_eight_products_hold_the_torque_of_a_weight_that_three_turns_about_any_axes_move() -> None:
-    """But for what hangs on fewer of them: each of axes x, y, x is at right angles to the one before."""
-    dice = np.random.default_rng(1)
-    q, first, second = dice.uniform(-2, 2, (3, 200))
-    turns = [Rotation.from_euler(axis, angle[:, None]) for axis, angle in zip("xyx", (first, second, q), strict=True)]
-    along = (turns[0] * turns[1]).apply([1.0, 0.0, 0.0])
-    arm = (turns[0] * turns[1] * turns[2]).apply([0.0, 1.0, 0.0])
-    torque = -np.sum(along * np.cross(arm, [0.0, 0.0, -1.0]), axis=1)
-
-    space = SpaceCoupling(ccc=1.0)
-    hung = [
-        float(space.load(Motion(0.0, a, 0.0, a, {"neighbour_position": b, "second_neighbour_position": c})))
-        for a, b, c in zip(q, first, second, strict=True)
-    ]
-    np.testing.assert_allclose(torque - hung, -np.sin(q) * np.sin(first), atol=1e-12)

@@ -20,6 +20,11 @@ Array = npt.NDArray[np.float64]
 OWN, LEVER, WEIGHT = 0.064, 0.03, 1.2
 """I + m c^2 and m l c [kg m2], and m g c [N m]."""
 FC, VISCOUS = 0.15, 0.08
+ELBOW, JOINT, WRIST = (
+    f'[mount]\ninertia = {inertia}\n[friction]\nmodel = "coulomb"\nFc = {level}\nsigma2 = {viscous}\n'
+    for inertia, level, viscous in ((0.064, 0.15, 0.08), (0.3, 0.5, 0.3), (0.06, 0.15, 0.08))
+)
+"""Cards of the arms' joints."""
 SLOW = 2.5
 """As arms move: weights need more torque than accelerations do."""
 NOISE, READING = 0.01, 2e-5

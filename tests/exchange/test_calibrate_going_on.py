@@ -99,6 +99,7 @@ def test_free_start_values_take_the_noise_of_single_readings_out_of_the_numbers(
     off = {}
     for initial in ("recorded", "free"):
         done = found(table, window=1.0, initial=initial, starts=1)
+        assert all(abs(done.numbers[name] / value - 1) < 0.2 for name, value in TRUTH.items())
         off[initial] = [(done.numbers[name] - value) / done.standard_errors[name] for name, value in TRUTH.items()]
     assert np.abs(off["free"]).max() < 2.5 < np.abs(off["recorded"]).max()
     told = done.as_json()

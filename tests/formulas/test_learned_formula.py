@@ -106,15 +106,6 @@ def test_the_right_form_is_found_with_its_numbers_in_their_ranges(name: str) -> 
     np.testing.assert_allclose(told - told.mean(), true - true.mean(), atol=0.03)
 
 
-def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> None:
-    formula = found("warm")
-    assert forms(formula) == {"bump", "line"}
-    told = {name: (value, error) for name, value, error, _ in Spelled(WARM, formula, False).numbers()}
-    assert abs(told["centre"][0]) < 4 * told["centre"][1]
-    assert abs(told["width"][0] - 0.2) < 4 * told["width"][1]
-    assert -told["k1"][0] / told["k2"][0] == pytest.approx(18.0, abs=0.3)
-
-
 def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
     """0.05 (y - 18) (x - 0.3), which three coefficients hold and no product of two forms does."""
     formula = proposed(*case_of(WARM, lambda x, y: 0.05 * (y - 18) * (x - 0.3)))

@@ -41,16 +41,12 @@ def test_the_nearest_file_of_defaults_is_read(tmp_path: Path, name: str, monkeyp
     (tmp_path / name).write_text(text, "utf-8")
     (tmp_path / "axis.toml").touch()
     (below := tmp_path / "day").mkdir()
+    (below / "pyproject.toml").write_text("[tool.other]\nx = 1\n", "utf-8")  # of another tool: it says nothing
     monkeypatch.chdir(below)
     found = read_settings(verbs)
     assert found.listed("columns") == ["tau=force"]
     assert found.of_verb("run") == {"card": str(Path("..") / "axis.toml"), "stop": 0.02}
     assert found.paths["out"] == str(Path("..") / "results")
-
-
-def test_another_tool_s_project_file_says_nothing(tmp_path: Path) -> None:
-    (tmp_path / "pyproject.toml").write_text("[tool.other]\nx = 1\n", "utf-8")
-    assert read_settings(verbs, tmp_path).pairs == {}
 
 
 @pytest.mark.parametrize(
@@ -69,9 +65,7 @@ def test_a_wrong_file_of_defaults_is_one_sentence(tmp_path: Path, text: str, sen
     assert sentence in str(refused.value)
 
 
-def test_a_run_takes_its_defaults_and_the_command_line_comes_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_takes_its_defaults_and_the_command_line_comes_first(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COSIM_OUT", "")
     Path("cosim.toml").write_text('out = "results"\n[run]\nstop = 0.02\n', "utf-8")

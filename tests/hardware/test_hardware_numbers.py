@@ -23,6 +23,7 @@ from cosim.hardware.move import Move, _inertia, _set_points
 from cosim.hardware.simulated import _injection
 from cosim.hardware.udp import UdpDrive, key_of
 from cosim.hardware.wired import _check_controller
+from cosim.master import exchange
 from cosim.support.errors import HardwareError
 
 SOURCES = Path(structures.__file__).parent
@@ -69,6 +70,14 @@ def test_words_stand_in_the_order_of_the_headers() -> None:
     assert udp.FRAME.size == 16 + 8 + 16 + 8 + sizes["NONCE"] + sizes["TAG"] + 4 == udp.TAGGED + sizes["TAG"] + 4
 
 
+def test_a_solver_says_why_it_failed_by_the_number_that_c_gives() -> None:
+    c = enums("../master/loop/rodas4.h")
+    words = {"SINGULAR": "singular", "NOT_FINITE": "not finite", "STEP_TOO_SMALL": "small", "TOO_MANY_STEPS": "million"}
+    assert {c[name] for name in words} == {*exchange._REASONS}
+    assert all(word in exchange._REASONS[c[name]] for name, word in words.items())
+    assert exchange.TOLERANCE == 1e-8
+
+
 @pytest.mark.parametrize("bits", [0, 1, 0b1010_0000_0000_0001, 0xFFFF])
 def test_a_word_of_faults_is_one_name_a_bit_and_each_head_has_four_bits_of_reasons(bits: int) -> None:
     names = list(words.FAULTS)
@@ -102,9 +111,10 @@ def test_an_axis_and_its_session_have_the_numbers_of_their_files(tmp_path: Path)
         assert (drive.watchdog, drive.heads, drive.eccentricity) == (20, 4, 1e-5)
         assert (drive.torque, drive.slew, drive.speed) == (given.limits.torque, given.limits.slew, given.limits.speed)
         one.advance(7)
-        own.late, own.waited, own.worst = 2, 3, 4500
+        own.late, own.waited, own.worst, axis.refused = 2, 3, 4500, 6
         told = one.statistics
         assert (told["cycles"], told["late_cycles"], told["worst_wake_up_us"]) == (5, 5, 4.5)
+        assert told["refused_limits"] == 6
         assert (told["real_time"], told["heads_left_out"]) == (False, {})
 
 
@@ -146,9 +156,7 @@ def test_a_key_has_16_bytes_to_64_kib_and_all_of_them_count(tmp_path: Path, size
 
 
 @pytest.mark.parametrize(("share", "fits"), [(0.0, True), (0.9e-9, True), (1.1e-9, False), (-1.1e-9, False)])
-def test_a_controller_is_sampled_as_often_as_the_loop_to_its_last_digits(
-    share: float, fits: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_controller_is_sampled_as_often_as_the_loop_to_its_last_digits(share, fits, monkeypatch) -> None:
     monkeypatch.setattr("cosim.hardware.wired.period_of", lambda _: STEP * (1 + share))
     component: Any = SimpleNamespace(can_get_and_set_state=True)
     eight = ["q_d", *(f"a{k}" for k in range(structures.INPUTS - 1))]

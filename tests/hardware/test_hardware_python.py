@@ -53,20 +53,16 @@ class Failing(Wall):
         raise OSError(f"no {what}")
 
 class Mute(Wall):
-    def later(self, what, answer):
-        return 1 / 0 if what == "write" else answer
+    later = lambda self, what, answer: 1 / 0 if what == "write" else answer
 
 class Lost(Wall):
-    def later(self, what, answer):
-        return {}["state"] if what == "status" else answer
+    later = lambda self, what, answer: {}["state"] if what == "status" else answer
 
 class Unwell(Wall):
-    def later(self, what, answer):
-        return 2 if what == "status" else answer
+    later = lambda self, what, answer: 2 if what == "status" else answer
 
 class Sleepy(Wall):
-    def later(self, what, answer):
-        return None if what == "read" else answer
+    later = lambda self, what, answer: None if what == "read" else answer
 
 class Nothing:
     pass

@@ -40,6 +40,10 @@ def with_column(recording: Recording, name: str, column: np.ndarray) -> Recordin
     return replace(recording, table=recording.table | {name: column})
 
 
+def without(recording: Recording, name: str) -> Recording:
+    return replace(recording, table={key: column for key, column in recording.table.items() if key != name})
+
+
 def with_story(recording: Recording, change: Callable[[dict[str, Any]], Any]) -> Recording:
     story = json.loads(json.dumps(recording.origin["hardware"]))
     changed = change(story)
@@ -89,6 +93,12 @@ def test_what_is_cut_off_is_seen(whole: Recording) -> None:
     assert not any(done.different.values())
     assert done.noticed == f"it has 500 of the {len(whole):,} cycles that were recorded"
     assert not done.identical
+    more = replay(sealed(with_column(whole, "machine.more", np.zeros(len(whole)))))
+    assert (more.identical, more.different["machine.more"]) == (False, len(whole))
+    assert replay(sealed(without(whole, "tau"))).different["tau"] == len(whole)
+    for name in ("machine.late", "machine.order", "machine.link", "v_d"):
+        with pytest.raises(HardwareError, match=f"it has no column {name}"):
+            replay(without(whole, name))
 
 
 def test_what_was_recorded_is_identical_and_its_seal_is_checked(whole: Recording) -> None:
@@ -120,9 +130,7 @@ def test_the_seal_depends_on_every_name_and_number() -> None:
         assert seal_of(other, {})["sha256"] != one["sha256"]
 
 
-def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(tmp_path, monkeypatch) -> None:
     path, out = tmp_path / "s.toml", tmp_path / "out"
     path.write_text(SCENARIO.replace(*SHORT), "utf-8")
     done = invoke("run", str(path), "--fast", "--out", str(out))
@@ -144,17 +152,6 @@ def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(
     assert [invoke(*command, "--card", card).exit_code for card in ("paper_mount", "emps")] == [0, 2]
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
     assert invoke(*command).exit_code == 2, "the controller is in no cache"
-
-
-def test_a_column_too_much_or_too_few_is_seen(whole: Recording) -> None:
-    more = replay(sealed(with_column(whole, "machine.more", np.zeros(len(whole)))))
-    assert (more.identical, more.different["machine.more"]) == (False, len(whole))
-    less = {name: column for name, column in whole.table.items() if name != "tau"}
-    assert replay(sealed(replace(whole, table=less))).different["tau"] == len(whole)
-    for name in ("machine.late", "machine.order", "machine.link", "v_d"):
-        less = {key: column for key, column in whole.table.items() if key != name}
-        with pytest.raises(HardwareError, match=f"it has no column {name}"):
-            replay(replace(whole, table=less))
 
 
 JUNK: list[Any] = [None, 0, -1, 1e300, "", "x" * 300, [], {}, [1], {"a": 1}, True, "../../etc/passwd"]
@@ -185,9 +182,7 @@ def test_no_story_that_was_altered_is_a_traceback(whole: Recording) -> None:
             replay(replace(whole, origin={"hardware": junk}))
 
 
-def test_a_controller_that_a_recording_names_is_never_opened(
-    whole: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_controller_that_a_recording_names_is_never_opened(whole, tmp_path, monkeypatch) -> None:
     own = next(
         one
         for one in (cache_home() / "fmus").glob("*.fmu")
@@ -227,21 +222,15 @@ def test_the_recording_is_one_that_a_diagnosis_reads(tmp_path: Path) -> None:
     assert replay(read).identical
 
 
-def test_a_black_box_is_let_go_of_when_its_session_ends(tmp_path: Path) -> None:
+def test_a_black_box_keeps_the_end_and_is_let_go_of_when_its_session_ends(tmp_path: Path) -> None:
     def mapped() -> bool:
         return str(tmp_path / "box") in Path("/proc/self/maps").read_text()
 
-    with session(tmp_path) as one:
-        one.advance(10)
+    with session(tmp_path, SIMULATED.model_copy(update={"black_box_seconds": 0.05})) as one:
+        one.advance(1234)
         assert mapped()
     assert not mapped(), "though the session is still there"
     assert one is not None
-
-
-def test_a_ring_that_is_full_keeps_the_end_and_says_that_the_beginning_is_gone(tmp_path: Path) -> None:
-    short = SIMULATED.model_copy(update={"black_box_seconds": 0.05})
-    with session(tmp_path, short) as one:
-        one.advance(1234)
     found = recorded(tmp_path)
     assert np.array_equal(found["machine.tick"], np.arange(734, 1234))
     with pytest.raises(HardwareError, match="begins at cycle 734"):

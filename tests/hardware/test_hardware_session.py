@@ -49,9 +49,7 @@ def test_the_tag_is_hmac_sha256_as_everybody_makes_it(size: int) -> None:
     assert tag.raw == hmac.digest(key, data, hashlib.sha256)
 
 
-def test_with_a_key_that_both_have_a_session_runs_and_with_another_it_is_refused(
-    tmp_path: Path, keys: tuple[str, str]
-) -> None:
+def test_with_a_key_that_both_have_a_session_runs_and_with_another_it_is_refused(tmp_path, keys) -> None:
     with drive(over("simulated", key_file=keys[0])) as there:
         with pytest.raises(HardwareError, match="was given another key than this loop"):
             session(tmp_path / "b", there.url, changed(SIMULATED, "test", key_file=keys[1]))
@@ -223,9 +221,7 @@ def from_now_on(watchdog_ms: float) -> Iterator[tuple[VirtualDrive, Loop]]:
 
 
 @pytest.mark.parametrize(("behind", "obeyed"), [(0, True), (40_000, True), (50_001, False), (500_001, False)])
-def test_an_order_older_than_the_watchdog_of_50_000_ticks_moves_nothing_and_is_counted(
-    behind: int, obeyed: bool
-) -> None:
+def test_an_order_older_than_the_watchdog_of_50_000_ticks_moves_nothing_and_is_counted(behind, obeyed) -> None:
     with from_now_on(5000.0) as (there, loop):
         loop.send(loop.order(5, 15, 1.0, NOW - behind))
         assert loop.silent() != obeyed

@@ -149,9 +149,7 @@ def answer(who: int, number: int, key: bytes, age: int = 0) -> bytes:
         (lambda who, number, key: b"", "corrupted"),
     ],
 )
-def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
-    tmp_path: Path, make: Callable[[int, int, bytes], bytes], noticed: str
-) -> None:
+def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(tmp_path, make, noticed) -> None:
     with replying(answering(make)) as url, impatient(session(tmp_path, url), 90) as one:
         one.advance(5)
         link = one.statistics["link"]
@@ -181,9 +179,7 @@ def test_a_loop_that_is_alive_and_a_port_that_is_taken_are_not_pushed_aside(tmp_
     ],
     ids=["silence", "another protocol", "an echo"],
 )
-def test_what_is_no_drive_is_refused_in_a_sentence(
-    tmp_path: Path, reply: Callable[[bytes], bytes | None], sentence: str
-) -> None:
+def test_what_is_no_drive_is_refused_in_a_sentence(tmp_path, reply, sentence) -> None:
     with replying(reply) as url, pytest.raises(HardwareError, match=sentence):
         session(tmp_path, url)
     assert not (tmp_path / "box").exists()
@@ -197,21 +193,16 @@ def test_what_is_no_drive_is_refused_in_a_sentence(
         ("late:1.5:0.2:3", {"kind": "late", "at": 1.5, "lasts": 0.2, "size": 3.0}),
     ],
 )
-def test_an_injection_begins_at_once_unless_it_says_when(text: str, said: dict[str, object]) -> None:
+def test_an_injection_begins_at_once_unless_it_says_when_and_one_of_frames_needs_frames(tmp_path, text, said) -> None:
     assert parse_injection(text) == said
     for wrong in ("late:x", "late:1:2:3:4", "gone"):
         with pytest.raises(HardwareError, match=r"no fault to inject|breaks a rule"):
             changed(SIMULATED, "--inject", inject=[parse_injection(wrong)])
-
-
-def test_a_fault_of_frames_is_refused_where_there_are_none(tmp_path: Path) -> None:
     with pytest.raises(HardwareError, match="a fault of frames, and the drive in this process has none"):
         Session(scenario(), faulty(kind="late"), tmp_path / "box", fast=True)
 
 
-def test_a_loop_without_a_clock_sleeps_as_it_waits_and_one_in_real_time_waits_as_its_machine_says(
-    tmp_path: Path,
-) -> None:
+def test_a_loop_without_a_clock_sleeps_as_it_waits_and_one_in_real_time_waits_as_its_machine_says(tmp_path) -> None:
     with drive() as there, session(tmp_path / "fast", there.url) as one:
         assert one.transport.udp.spin == 0  # type: ignore[attr-defined]
         assert one.transport.udp.patience >= 1e9, "a drive without a clock may be a slow computer"  # type: ignore[attr-defined]

@@ -185,9 +185,7 @@ NOTHING = Recording("box", {"t": np.zeros(0)})
         ([0, 1, 2], [0, 1, 0], "was altered: cycle 1 follows cycle 0"),
     ],
 )
-def test_cycles_begin_with_the_session_and_follow_each_other_less_those_that_were_late(
-    ticks: list[int], late: list[int], rule: str
-) -> None:
+def test_cycles_begin_with_the_session_and_follow_each_other_less_those_that_were_late(ticks, late, rule) -> None:
     with pytest.raises(HardwareError, match=rule) if rule else nullcontext():
         _check_ticks(NOTHING, np.array(ticks, dtype=np.int64), np.array(late, dtype=np.uint32))
 

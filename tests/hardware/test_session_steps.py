@@ -1,10 +1,8 @@
 """A session cycle by cycle against a loop that only counts."""
 
-import re
 import resource
 from collections.abc import Callable
 from contextlib import nullcontext
-from pathlib import Path
 from time import monotonic, sleep
 from types import SimpleNamespace
 from typing import Any
@@ -85,9 +83,7 @@ def up(after: int, state: int = 4, faults: int = 0) -> Callable[[Any], None]:
     ],
     ids=["as soon as it follows", "the longest patience", "no longer", "a fault on the way"],
 )
-def test_to_enable_takes_a_reset_and_as_many_cycles_as_the_drive_needs(
-    follow: Callable[[Any], None], cycles: int, sentence: str
-) -> None:
+def test_to_enable_takes_a_reset_and_as_many_cycles_as_the_drive_needs(follow, cycles, sentence) -> None:
     """Its patience is four steps up to operation of five cycles each, and four cycles beside."""
     one = counting(follow)
     with pytest.raises(HardwareError, match=sentence) if sentence else nullcontext():
@@ -137,6 +133,8 @@ def test_a_limit_may_be_made_smaller_down_to_nothing(value: float, good: bool) -
         return
     with pytest.raises(HardwareError, match='The limit "speed" is 50 and can be tightened, not set to'):
         one.tighten("speed", value)
+    with pytest.raises(HardwareError, match='"heat" is no limit; limits are: torque'):
+        one.tighten("heat", 20.0)
     assert one._session.change == 0
 
 
@@ -177,9 +175,7 @@ def moving(monkeypatch: pytest.MonkeyPatch, torques: list[float], inertias: list
     return asked
 
 
-def test_a_move_takes_a_fifth_of_the_following_error_and_a_quarter_of_the_torque(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_move_takes_a_fifth_of_the_following_error_and_a_quarter_of_the_torque(monkeypatch) -> None:
     """Needed at first: twice a quarter; so the way is halved, and then it stays."""
     limits = SIMULATED.limits
     quarter = limits.torque / 4
@@ -195,9 +191,7 @@ def test_a_move_takes_a_fifth_of_the_following_error_and_a_quarter_of_the_torque
 
 
 @pytest.mark.parametrize(("seen", "good"), [(1.49, True), (0.67, True), (1.51, False), (0.66, False)])
-def test_a_move_is_right_up_to_a_factor_of_one_and_a_half(
-    seen: float, good: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_move_is_right_up_to_a_factor_of_one_and_a_half(seen, good, monkeypatch) -> None:
     moving(monkeypatch, [1.0] * 3, [1.0, seen])
     if good:
         assert move.try_move(scenario(), SIMULATED, fast=True).scale == pytest.approx(1 / seen)
@@ -289,21 +283,3 @@ def test_a_story_has_what_a_replay_needs(changes: dict[str, Any], good: bool) ->
         return
     with pytest.raises(ValueError, match="validation error"):
         Story.model_validate(STORY | changes)
-
-
-def test_a_solver_says_why_it_failed_by_the_number_that_c_gives() -> None:
-    from cosim.master import exchange
-
-    header = Path(exchange.__file__).with_name("loop") / "rodas4.h"
-    body = re.search(r"enum \{ SOLVED, ([^}]*?) \}", header.read_text("utf-8"))
-    assert body is not None
-    words = {
-        "SINGULAR": "singular",
-        "NOT_FINITE": "not finite",
-        "STEP_TOO_SMALL": "too small",
-        "TOO_MANY_STEPS": "million",
-    }
-    said = {number: words[name] for number, name in enumerate(body[1].split(", "), 1)}
-    assert list(said) == list(exchange._REASONS)
-    assert all(word in exchange._REASONS[number] for number, word in said.items())
-    assert exchange.TOLERANCE == 1e-8

@@ -37,9 +37,7 @@ def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.Captu
     assert "<script" not in page
 
 
-def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(tmp_path, monkeypatch) -> None:
     """Over a small part of a turn a cable is the same as a weight, until the axis goes further."""
     given, out = written(tmp_path, CABLE), tmp_path / "out"
     asked = {"machine": given[2], "budget": 42.5, "seconds": 10.0, "limits": LIMITS}
@@ -96,9 +94,7 @@ def test_a_machine_that_leaves_a_limit_is_not_moved_again(tmp_path: Path) -> Non
     assert len([*(tmp_path / "out" / "recordings").iterdir()]) == 1
 
 
-def test_a_limit_left_on_the_way_is_the_end_is_said_and_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_limit_left_on_the_way_is_the_end_is_said_and_is_kept(tmp_path, monkeypatch) -> None:
     given, out = written(tmp_path, CABLE), tmp_path / "out"
     record = CoSimulated.record
 

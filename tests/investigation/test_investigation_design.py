@@ -54,9 +54,7 @@ def test_a_long_stroke_tells_a_cable_from_a_weight_and_a_fast_tone_does_not(prob
     assert chosen.worth == 10.0  # what settles it; of those, the one of most new ground
 
 
-def test_a_doubtful_name_a_special_case_and_an_effect_not_proven_are_asked_from_the_general_side(
-    problem: Problem,
-) -> None:
+def test_a_doubtful_name_a_special_case_and_an_effect_not_proven_are_asked_from_the_general_side(problem) -> None:
     """With the cable a model follows one without it, so the other side alone would never promise anything."""
     cable = CABLE_WRAP(stiffness=2.0, home=0.05)  # type: ignore[call-arg]
     fits = (problem.fit(replace(problem.mount, effects=one), 15) for one in ((), (cable,)))
@@ -143,9 +141,7 @@ def test_a_motion_leaves_room_for_what_the_axis_strayed_from_its_set_point(probl
     assert tops[1] == pytest.approx(0.5 * tops[0], rel=0.1)
 
 
-def test_short_moves_are_allowed_by_the_torque_that_they_ask_for_not_by_what_a_low_pass_leaves_of_it(
-    problem: Problem,
-) -> None:
+def test_short_moves_are_allowed_by_the_torque_that_they_ask_for_not_by_what_a_low_pass_leaves_of_it(problem) -> None:
     """A move of .05 s at 3.9 rad/s2 was planned with 2.8: one of 1000 motions needed 1.3 % more torque than allowed."""
     known, ours = replace(problem.prepared, cutoff=12.0), problem.fit(problem.mount, 5)
     heavy = replace(ours, mount=replace(ours.mount, axis=replace(ours.mount.axis, inertia=20.0)))

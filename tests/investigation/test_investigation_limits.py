@@ -30,6 +30,7 @@ ENDS = ("-inf:inf", "-1:inf", "nan:1", "0:1e-300", "-1e308:1e308", "1", ":")
     [
         *product(("speed", "acceleration", "torque", "frequency"), ABSURD, ["(a limit is|its ends)"]),
         *product(("position", "forbidden"), ENDS, [""]),
+        *product(["forbidden"], ("5:5", "9:7", "0:3", "-1:3", "a:b", "1:2:3"), ["forbidden=FROM:TO"]),
         ("position", "1:2", ".*stands at 0"),
         ("position", "2:1", "a limit is position=LOW:HIGH"),
         ("jerk", "3", "a limit is position=LOW:HIGH"),
@@ -37,9 +38,7 @@ ENDS = ("-inf:inf", "-1:inf", "nan:1", "0:1e-300", "-1e308:1e308", "1", ":")
         ("frequency", "250", ".*shows less than 250 Hz"),
     ],
 )
-def test_limits_that_an_axis_cannot_have_are_refused_before_anything_moves(
-    tmp_path: Path, name: str, text: str, said: str
-) -> None:
+def test_limits_that_an_axis_cannot_have_are_refused_before_anything_moves(tmp_path, name, text, said) -> None:
     with pytest.raises(InputError, match=rf"--limits {name}={text}: {said}"):
         investigate(*written(tmp_path)[:2], tmp_path / "out", limits={name: text})
     assert not (tmp_path / "out").exists()
@@ -56,9 +55,7 @@ def test_limits_that_an_axis_cannot_have_are_refused_before_anything_moves(
         ({"forbidden": "0.2:0.3"}, r"forbidden band of 0\.2 to 0\.3 Hz, in which a part of it lies"),
     ],
 )
-def test_the_own_motion_of_a_scenario_is_asked_for_every_limit_before_it_runs(
-    tmp_path: Path, limits: dict[str, str], said: str
-) -> None:
+def test_the_own_motion_of_a_scenario_is_asked_for_every_limit_before_it_runs(tmp_path, limits, said) -> None:
     given, out = written(tmp_path, CABLE), tmp_path / "out"
     with pytest.raises(InputError, match=f"The first motion, the set point of axis, would leave a limit: {said}"):
         investigate(*given[:2], out, machine=given[2], limits=limits, seconds=10)
@@ -94,9 +91,7 @@ def test_a_tone_that_no_motion_is_long_enough_for_is_refused(tmp_path: Path) -> 
         ],
     ],
 )
-def test_times_are_finite_and_the_own_motion_counts_in_the_budget_before_anything_moves(
-    tmp_path: Path, asked: dict[str, float], said: str
-) -> None:
+def test_times_are_finite_and_the_own_motion_counts_in_the_budget_before_anything_moves(tmp_path, asked, said) -> None:
     out = tmp_path / "out"
     with pytest.raises(InputError, match=said):
         investigate(*written(tmp_path)[:2], out, **asked)
@@ -135,9 +130,7 @@ def test_every_family_stays_finite_in_time_and_in_limits_however_absurd_these_ar
         ({0.5: 1.0, 8.0: 0.05}, 0.5),  # a four-hundredth
     ],
 )
-def test_a_motion_is_as_fast_as_the_tone_at_which_nearly_all_of_its_acceleration_ends(
-    tones: dict[float, float], hertz: float
-) -> None:
+def test_a_motion_is_as_fast_as_the_tone_at_which_nearly_all_of_its_acceleration_ends(tones, hertz) -> None:
     t = np.arange(0, 20, 2e-3)
     a = sum(size * np.cos(2 * np.pi * one * t) for one, size in tones.items())
     v = sum(size * np.sin(2 * np.pi * one * t) / (2 * np.pi * one) for one, size in tones.items())

@@ -20,7 +20,7 @@ from cosim.data.signals import Noise, Steps
 from cosim.master.simulate import simulate
 from cosim.models.cache import with_fmus
 from cosim.support.errors import StepError, WiringError
-from cosim.system.algorithm import Algorithm, Energy, GaussSeidel, Iterated, Jacobi
+from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.faults import Freeze
 from cosim.system.scenario import read_scenario
 from cosim.system.system import Fmu, Function, System
@@ -64,9 +64,7 @@ def plain(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Tiny:
         pytest.param(Jacobi(kind="jacobi"), 2, 4, id="a longer step of the importer is several ticks"),
     ],
 )
-def test_each_algorithm_has_the_bits_of_the_run(
-    algorithm: Algorithm, fmi: int, every: int, plain: Tiny, tmp_path: Path
-) -> None:
+def test_each_algorithm_has_the_bits_of_the_run(algorithm, fmi, every, plain, tmp_path) -> None:
     """Components of the other FMI version than the whole."""
     assert_same_bits(*both(oscillator(plain[5 - fmi], algorithm=algorithm), tmp_path, fmi, every))
 
@@ -259,9 +257,7 @@ def test_what_cannot_be_nested_is_said_in_a_sentence(tiny: Tiny, tmp_path: Path)
         (["theirs.ssp"], "theirs.ssp is a system, not a card; with --as-fmu"),
     ],
 )
-def test_wrong_use_of_the_command_is_a_sentence(
-    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_use_of_the_command_is_a_sentence(words, sentence, tmp_path, capsys) -> None:
     assert call("export", *words, "--out", tmp_path) == 2
     assert sentence in capsys.readouterr().err
 

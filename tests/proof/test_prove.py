@@ -83,17 +83,10 @@ def test_a_truth_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> 
         seals.check([opened | {"run": 1}])
     with pytest.raises(ProofError, match="Case 0 was sealed before with another truth"):
         seals.write(0, seal(truth, salt_of(6, 0)))
-    assert Seals(tmp_path / "seals.jsonl").known == {0: seal(truth, salt)}
-
-
-def test_a_seal_that_was_cut_short_is_written_again(tmp_path: Path) -> None:
-    path = tmp_path / "seals.jsonl"
-    Seals(path).write(0, "a" * 64)
-    with path.open("a") as file:
-        file.write('{"run": 1, "se')
-    seals = Seals(path)
-    seals.write(1, "b" * 64)
-    assert Seals(path).known == {0: "a" * 64, 1: "b" * 64}
+    with (tmp_path / "seals.jsonl").open("a") as file:
+        file.write('{"run": 1, "se')  # cut short: it is written again
+    Seals(tmp_path / "seals.jsonl").write(1, "b" * 64)
+    assert Seals(tmp_path / "seals.jsonl").known == {0: seal(truth, salt), 1: "b" * 64}
 
 
 def test_an_answer_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
@@ -130,9 +123,7 @@ def test_what_a_diagnosis_says_is_what_is_scored() -> None:
     assert set(baselines.compared(found.traces, names=("refit", "kernel"))) == {"refit", "kernel"}
 
 
-def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv(
         "PYTHONPATH", str(Path(__file__).parent)
     )  # the process of the tool imports what stands in for it
@@ -271,6 +262,9 @@ def test_scores_of_hand_made_answers_are_what_one_counts() -> None:
     assert found["gap_closed"]["met"] is True
     assert (found["gap_closed"]["sure"], found["false_alarms"]["sure"]) == (False, True)
     assert found["exact"]["met"] is None
+    case = row("one", ["cogging"], ["cogging"], after=1.0, best=1.0)
+    one, many = (scores([case] * count)["gap_closed"] for count in (1, 20))
+    assert (one["met"], one["sure"], many["sure"]) == (True, False, True)
     assert all(found[key]["low"] <= found[key]["value"] <= found[key]["high"] for key in expected)
 
 
@@ -287,13 +281,6 @@ def test_of_several_effects_those_count_without_which_the_true_structure_predict
     several = [row("several", ["delay", "lag"], [name]) | {"ceiling": best} for name in ("delay", "lag", "cogging")]
     found = scores([*several, row("several", ["delay", "lag"], []) | {"ceiling": {"reason": "no fit"}}])
     assert (found["recall"]["value"], found["findable_recall"]["value"]) == (2 / 8, 1 / 3)
-
-
-def test_one_case_makes_nothing_sure() -> None:
-    found = scores([row("one", ["cogging"], ["cogging"], after=1.0, best=1.0)])
-    assert (found["gap_closed"]["met"], found["gap_closed"]["sure"]) == (True, False)
-    many = scores([row("one", ["cogging"], ["cogging"], after=1.0, best=1.0)] * 20)
-    assert many["gap_closed"]["sure"] is True
 
 
 def test_a_tool_that_crashed_is_wrong_and_raises_no_alarm() -> None:

@@ -86,14 +86,6 @@ def test_the_axis_rests_below_break_away_and_slides_above(blend: float) -> None:
     assert freed["angle"][-1] > 0.05
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_null_needs_inertia_and_friction_and_nothing_else(seed: int) -> None:
-    case = make_case(seed, duration=12)
-    for k in range(3):
-        _, command, need = torques(case, k)
-        assert np.std(command - need) < 0.1 * case.truth["friction_rms"]
-
-
 def test_delay_lag_and_clock_show_as_lateness() -> None:
     assert abs(lag(make_case(4, duration=8))) < 2e-4
     for name, key in (("delay", "delay_ms"), ("actuator_lag", "time_constant_ms")):

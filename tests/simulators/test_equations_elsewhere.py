@@ -2,15 +2,13 @@
 
 import subprocess
 import sys
+from math import sin
 from pathlib import Path
 
 import numpy as np
-import pymoca.ast as ast
-import pymoca.parser
 import pytest
 from modelica_flat import Flat, at_random, in_modelica
 from nested_runs import InFmpy
-from pymoca.tree import flatten
 
 from cosim.api.export import export
 from pyfmi_models.card import parse_card, read_card
@@ -77,11 +75,6 @@ def test_two_cards_go_into_one_program(tmp_path: Path) -> None:
     subprocess.run([compiled(tmp_path, "both")], check=True)
 
 
-def test_a_controller_is_no_joint() -> None:
-    with pytest.raises(ExportError, match="sampled"):
-        c_files(read_card("paper_mount").controller_model())
-
-
 def test_files_that_are_there_are_only_replaced_with_force(tmp_path: Path) -> None:
     model = read_card("paper_mount").plant().model()
     export_c(model, tmp_path / "c")
@@ -99,56 +92,23 @@ def test_files_that_are_there_are_only_replaced_with_force(tmp_path: Path) -> No
 
 LIBRARY = """
 package Modelica
-  package Blocks
-    package Interfaces
-      connector RealInput = input Real;
-      connector RealOutput = output Real;
-    end Interfaces;
-  end Blocks;
+  package Blocks package Interfaces
+    connector RealInput = input Real;
+    connector RealOutput = output Real;
+  end Interfaces; end Blocks;
   package Mechanics
-    package Rotational
-      package Interfaces
-        connector Flange_a
-          Real phi(unit = "rad");
-          flow Real tau(unit = "N.m");
-        end Flange_a;
-        connector Flange_b
-          Real phi(unit = "rad");
-          flow Real tau(unit = "N.m");
-        end Flange_b;
-      end Interfaces;
-    end Rotational;
-    package Translational
-      package Interfaces
-        connector Flange_a
-          Real s(unit = "m");
-          flow Real f(unit = "N");
-        end Flange_a;
-        connector Flange_b
-          Real s(unit = "m");
-          flow Real f(unit = "N");
-        end Flange_b;
-      end Interfaces;
-    end Translational;
+    package Rotational package Interfaces
+      connector Flange_a Real phi(unit = "rad"); flow Real tau(unit = "N.m"); end Flange_a;
+      connector Flange_b Real phi(unit = "rad"); flow Real tau(unit = "N.m"); end Flange_b;
+    end Interfaces; end Rotational;
+    package Translational package Interfaces
+      connector Flange_a Real s(unit = "m"); flow Real f(unit = "N"); end Flange_a;
+      connector Flange_b Real s(unit = "m"); flow Real f(unit = "N"); end Flange_b;
+    end Interfaces; end Translational;
   end Mechanics;
 end Modelica;
 """
 """The connectors that are used, as the Modelica Standard Library 4.0 declares them."""
-
-
-class FlatJoint(Flat):
-    """The flattened class `Joint`."""
-
-    def __init__(self, text: str, package: str) -> None:
-        tree = pymoca.parser.parse(text + LIBRARY)
-        assert tree is not None, text
-        place = ast.ComponentRef(name=package, child=[ast.ComponentRef(name="Joint")])
-        (flat,) = flatten(tree, place).classes.values()
-        self.symbols = flat.symbols
-        # That nothing is connected outside, so that a flow is zero, is said of the symbol itself: it is left out here.
-        self.equations = dict(self._solved(one) for one in flat.equations if not isinstance(one.left, ast.Symbol))
-
-
 BRAKED = """[mount]
 inertia = 2
 torque_limit = 5
@@ -163,15 +123,13 @@ phase = 0.3
 """
 
 
-def text_of(plant: Mount) -> str:
-    return flange_text(plant.model(), "Mine", derivation_of(plant))
+def flat_of(plant: Mount) -> Flat:
+    return Flat(flange_text(plant.model(), "Mine", derivation_of(plant)) + LIBRARY, "Mine", "Joint")
 
 
 def test_a_flanged_joint_moves_as_the_hand_written_equation() -> None:
     """J phi'' = min(tau, limit) + tau_a + tau_b - Fc sign(w) - sigma2 w - mgl sin(phi + phase)."""
-    from math import sin
-
-    flat = FlatJoint(text_of(parse_card(BRAKED, "braked").plant()), "Mine")
+    flat = flat_of(parse_card(BRAKED, "braked").plant())
     for phi, w, tau, a, b in ((0.2, 0.4, 1.0, 0.7, -0.2), (-1.0, -0.3, -9.0, 2.0, 3.0)):
         given = {"plant.position": phi, "plant.speed": w, "tau": tau, "flange_a.tau": a, "flange_b.tau": b, "time": 0.0}
         found = flat.values(given)
@@ -186,7 +144,7 @@ def test_a_flanged_joint_moves_as_the_hand_written_equation() -> None:
 @pytest.mark.parametrize("card", ["paper_mount_directional", "altaz_altitude", "emps"])
 def test_with_free_flanges_it_is_the_causal_plant(card: str) -> None:
     plant = read_card(card).plant()
-    model, flat = plant.model(), FlatJoint(text_of(plant), "Mine")
+    model, flat = plant.model(), flat_of(plant)
     push = "f" if plant.motion == "linear" else "tau"
     t, (states, inputs, _) = at_random(model, 3)
     given = {
@@ -201,8 +159,10 @@ def test_with_free_flanges_it_is_the_causal_plant(card: str) -> None:
         assert found[f"der(plant.{in_modelica(model, state.name)})"] == pytest.approx(rate, rel=1e-9, abs=1e-12)
 
 
-def test_a_model_without_a_torque_from_outside_has_no_flange(tmp_path: Path) -> None:
+def test_a_controller_is_no_joint_and_without_a_torque_from_outside_has_no_flange(tmp_path: Path) -> None:
     controller = read_card("paper_mount").controller_model()
+    with pytest.raises(ExportError, match="sampled"):
+        c_files(controller)
     with pytest.raises(ExportError, match="disturbance"):
         export_flange(controller, tmp_path / "C.mo")
 

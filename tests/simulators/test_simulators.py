@@ -1,6 +1,7 @@
 """A card in other simulators: what files hold moves as the FMU does, and what they lose is what the table says."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,50 +40,44 @@ def asked(mount: Mount) -> np.ndarray:
     return np.array([q, v, np.gradient(v, PERIOD)])
 
 
-class Loop:
-    """PD with acceleration ahead; the torque is held for one period."""
-
-    def __init__(self, mount: Mount) -> None:
-        omega = 2 * np.pi * HERTZ
-        self.inertia = float(mount.axis.inertia)
-        self.kp, self.kd = omega**2, 2 * 0.7 * omega
-        self.last = 0.0
-
-    def torque(self, want: np.ndarray, q: float) -> float:
-        v, self.last = (q - self.last) / PERIOD, q
-        return self.inertia * (want[2] + self.kp * (want[0] - q) + self.kd * (want[1] - v))
+def looped(mount: Mount, read: Callable[[], float], step: Callable[[int, float], None]) -> np.ndarray:
+    """Torque and position in each period, (rows, 2), of PD with acceleration ahead; the torque is held for one."""
+    omega, last, rows = 2 * np.pi * HERTZ, 0.0, []
+    for k, (q_d, v_d, a_d) in enumerate(asked(mount).T):
+        q = read()
+        v, last = (q - last) / PERIOD, q
+        torque = float(mount.axis.inertia) * (a_d + omega**2 * (q_d - q) + 2 * 0.7 * omega * (v_d - v))
+        rows.append((torque, q))
+        step(k, torque)
+    return np.array(rows)
 
 
 def in_fmu(mount: Mount, folder: Path) -> np.ndarray:
-    """Torque and position in each period: (rows, 2)."""
     path = folder / "plant.fmu"
     export_fmu(mount.model(), path, fmi=3, force=True)
-    fmu, loop, rows = InFmpy(path, PERIOD), Loop(mount), []
+    fmu = InFmpy(path, PERIOD)
     fmu.start()
-    for k, want in enumerate(asked(mount).T):
-        (q,) = fmu.get(["q"])
-        rows.append((loop.torque(want, q), q))
-        fmu.set({"tau": rows[-1][0]})
+
+    def step(k: int, torque: float) -> None:
+        fmu.set({"tau": torque})
         fmu.fmu.doStep(k * PERIOD, PERIOD)
-    return np.array(rows)
+
+    return looped(mount, lambda: fmu.get(["q"])[0], step)
 
 
 def in_mujoco(mount: Mount, text: str) -> np.ndarray:
-    """The same in MuJoCo, whose steps divide the period."""
+    """In MuJoCo, whose steps divide the period."""
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    steps = round(PERIOD / model.opt.timestep)
-    loop, rows = Loop(mount), []
     mujoco.mj_forward(model, data)
-    for want in asked(mount).T:
-        q = float(data.sensor("q").data[0])
-        rows.append((loop.torque(want, q), q))
-        data.ctrl[0] = rows[-1][0]
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
+
+    def step(_: int, torque: float) -> None:
+        data.ctrl[0] = torque
+        mujoco.mj_step(model, data, round(PERIOD / model.opt.timestep))
         mujoco.mj_forward(model, data)
-    return np.array(rows)
+
+    return looped(mount, lambda: float(data.sensor("q").data[0]), step)
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> tuple[float, float]:
@@ -141,14 +136,9 @@ def test_what_mujoco_loses_in_a_loop_is_what_the_table_says(tmp_path: Path) -> N
     assert without.lost > 5 * held.lost
 
 
-def recorded(plant: Mount, folder: Path) -> dict[str, np.ndarray]:
-    rows = in_fmu(plant, folder)
-    noise = np.random.default_rng(1).normal(0, 0.1, len(rows))
-    return {"t": np.arange(len(rows)) * PERIOD, "tau": rows[:, 0] + noise, "q": rows[:, 1]}
-
-
 def test_the_error_on_a_recording_stands_beside_that_of_the_card(tmp_path: Path) -> None:
-    table = recorded(mount(), tmp_path)
+    tau, q = in_fmu(mount(), tmp_path).T
+    table = {"t": np.arange(len(q)) * PERIOD, "tau": tau + np.random.default_rng(1).normal(0, 0.1, len(q)), "q": q}
     done = export("paper_mount", tmp_path / "out", fmi=3, mujoco=True, urdf=True, recording=table)
     mujoco, urdf = done.held
     assert mujoco.ratio == pytest.approx(1, abs=0.05)
@@ -210,9 +200,7 @@ def test_isaac_text_is_usd_with_friction_per_degree(tmp_path: Path) -> None:
     assert numbers["viscousFrictionCoefficient"] == pytest.approx(law.sigma2 * np.pi / 180)
 
 
-def test_the_command_writes_files_and_a_table_overwrites_nothing_and_needs_its_recording(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_files_and_a_table_overwrites_nothing_and_needs_its_recording(tmp_path, capsys) -> None:
     asked = ["export", "paper_mount", "--fmi", "3", "--mujoco", "--urdf", "--isaac", "--json", "--out", str(tmp_path)]
     assert call(*asked) == 0
     told = json.loads(capsys.readouterr().out)

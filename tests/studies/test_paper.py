@@ -159,8 +159,8 @@ def test_friction_that_wanders_breaks_away_at_another_torque_each_time(identifie
 
 
 @pytest.fixture(scope="module")
-def invented(identified: Identification) -> Results:
-    """Studies with the paper's own numbers in the place of runs, and with curves."""
+def written(identified: Identification, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """What is written of studies with the paper's own numbers in the place of runs, and with curves."""
     t = np.arange(0, 15, 0.01)
     names = ("e", "friction", "tau", "zeta3", "v_d", "v", "true_friction")
     outcome = {
@@ -177,24 +177,19 @@ def invented(identified: Identification) -> Results:
         ]
         return Study(trials=tuple(trials), seeds=(3, 4))
 
-    return Results(found=of(conditions()), variants=of(definitions()), identified=identified)
+    results = Results(found=of(conditions()), variants=of(definitions()), identified=identified)
+    return write(tmp_path_factory.mktemp("out"), results, command="cosim paper")
 
 
-@pytest.fixture(scope="module")
-def written(invented: Results, tmp_path_factory: pytest.TempPathFactory) -> Written:
-    return write(tmp_path_factory.mktemp("out"), invented, command="cosim paper")
-
-
-def test_table_4_is_written_as_the_contract_says(written: Written) -> None:
+def test_table_4_is_as_the_contract_says_and_each_small_file_is_on_the_page_with_what_is_not_as_expected(
+    written,
+) -> None:
     folder = written.files[0].parent
     table = json.loads((folder / "table4.json").read_text())
     assert table == written.table
     assert set(CASES) == set(table["ideal"]) == set(table["base"]) == set(table["base_kp255"])
     assert {"mean_ratio", "order_share", "seeds", "C1"} <= set(table["realistic"])
     assert table["realistic"]["mean_ratio"]["C2a"] == pytest.approx(12.75 / 47.58)
-
-
-def test_every_file_is_small_and_named_on_the_page_which_says_what_is_not_as_expected(written: Written) -> None:
     page = next(path for path in written.files if path.name == "README.md").read_text()
     assert "| the paper, measured | 47.58 | 0.268 | 1.549 | 0.195 | 0.868 | yes |" in page
     for path in written.files:

@@ -164,9 +164,7 @@ def test_the_picture_has_a_line_for_each_method_and_says_the_limits(tmp_path: Pa
         ("emps", 'emps: [friction] model is "coulomb"; only "lugre" has a stiff state'),
     ],
 )
-def test_the_command_ends_with_one_sentence(
-    card: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_ends_with_one_sentence(card, message, tmp_path, capsys) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["--card", card, "--out", str(tmp_path / "out")])
     assert caught.value.code == 2

@@ -29,16 +29,20 @@ OPERATORS = {
 
 
 class Flat:
-    """A flattened model with values for what is given; everything else follows from its equations."""
+    """A flattened model with values for what is given; everything else follows from its equations.
 
-    def __init__(self, text: str, package: str) -> None:
+    An equation of a symbol says that nothing is connected outside, so that a flow is zero: those are left out.
+    """
+
+    def __init__(self, text: str, package: str, model: str = "Plant") -> None:
         tree = pymoca.parser.parse(text)
         assert tree is not None, text
-        place = ast.ComponentRef(name=package, child=[ast.ComponentRef(name="Plant")])
+        place = ast.ComponentRef(name=package, child=[ast.ComponentRef(name=model)])
         (flat,) = flatten(tree, place).classes.values()
         self.symbols = flat.symbols
-        self.equations = dict(map(self._solved, flat.equations))
-        assert len(self.equations) == len(flat.equations)
+        equations = [one for one in flat.equations if not isinstance(one.left, ast.Symbol)]
+        self.equations = dict(map(self._solved, equations))
+        assert len(self.equations) == len(equations)
 
     @staticmethod
     def _solved(equation: Any) -> tuple[str, tuple[Any, Any]]:
