@@ -14,6 +14,7 @@ import numpy as np
 from compiling import compiled, with_stubs
 from compiling import packed as pack
 from tiny_fmu import SOURCE as TINY
+from tiny_fmu import Row, description
 
 SOURCE = (
     TINY[: TINY.index("enum {")]
@@ -53,7 +54,6 @@ static int step(M *m, double t, double h) {
 )
 TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
 """The numbers of what is recorded; the FMU states others."""
-Row = tuple[str, str, str, str, str]
 VARIABLES: tuple[Row, ...] = (
     ("i", "input", "A", "0", ""),
     ("J", "parameter", "kg.m2", "0.02", 'min="1e-6" nominal="0.01"'),
@@ -71,6 +71,10 @@ VARIABLES: tuple[Row, ...] = (
 )
 
 
+EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01"/>'
+TIME = '<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>'
+
+
 def motor(directory: Path, version: int, planted: int = 0) -> Path:
     """Compile and pack the motor for one FMI version, with an error planted in its binary."""
     stem = f"motor{version}{f'_{planted}' if planted else ''}"
@@ -82,45 +86,13 @@ def packed(
 ) -> Path:
     """Compile and pack an FMU written like the motor, whose value references are the places of its variables."""
     library = compiled(name, with_stubs(source), *options)
-    return pack(directory / f"{stem}.fmu", version, description(version, variables, name), library)
+    xml = description(version, variables, name).replace("<ModelVariables>", EXPERIMENT + "<ModelVariables>")
+    if version == 3:
+        xml = xml.replace("</ModelVariables>", TIME + "</ModelVariables>")
+    return pack(directory / f"{stem}.fmu", version, xml, library)
 
 
-def description(version: int, variables: Sequence[Row] = VARIABLES, model: str = "motor") -> str:
-    """The XML of one FMI version."""
-    token = "guid" if version == 2 else "instantiationToken"
-    units = "".join(f'<Unit name="{unit}"/>' for unit in dict.fromkeys(row[2] for row in variables))
-    rows, told = [], [k for k, row in enumerate(variables) if row[1] == "output"]
-    for number, (name, causality, unit, start, more) in enumerate(variables):
-        variability = "tunable" if causality == "parameter" else "continuous"
-        exact = ' initial="exact"' if causality != "input" else ""
-        common = f'name="{name}" valueReference="{number}" causality="{causality}" variability="{variability}"{exact}'
-        value = f'unit="{unit}" start="{start}" {more}'
-        old = f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"
-        rows.append(old if version == 2 else f"<Float64 {common} {value}/>")
-    if version == 2:
-        outputs = "".join(f'<Unknown index="{k + 1}" dependencies=""/>' for k in told)
-        outputs = f"<Outputs>{outputs}</Outputs>"
-    else:
-        rows.append('<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>')
-        outputs = "".join(f'<Output valueReference="{k}" dependencies=""/>' for k in told)
-    saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="true" canHandleVariableCommunicationStepSize="true"'
-    return (
-        f'<fmiModelDescription fmiVersion="{version}.0" modelName="{model}" {token}="t">'
-        f'<CoSimulation modelIdentifier="{model}" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
-        f'<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01"/>'
-        f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
-    )
-
-
-def driven(
-    fmu: Path,
-    given: np.ndarray,
-    truth: dict[str, float] | None = None,
-    *,
-    into: str = "i",
-    outputs: Sequence[str] = ("w", "phi"),
-    step: float = 0.01,
-) -> dict[str, np.ndarray]:
+def driven(fmu, given, truth=None, *, into="i", outputs=("w", "phi"), step=0.01) -> dict[str, np.ndarray]:
     """What an FMU with these numbers answers to the samples of an input, a row a sample."""
     from cosim.master.simulate import simulate
     from cosim.system.system import System

@@ -2,8 +2,10 @@
 
 It does not carry experiments that only the numbers before would meet. A run, a sweep and a system say the first time
 and variable at which the range is left in which a model is proven.
+Learned terms go along as maps with breakpoints and units, and are shown as curves.
 """
 
+import json
 import shutil
 import zipfile
 from dataclasses import replace
@@ -12,21 +14,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from experiment_archives import FOLDER, bundle, manifest, with_files
+from fmpy.validation import validate_fmu
 from motor_fmu import driven, recorded
 from small_loop import text_of
 
 import cosim
 from cosim.data.recording import Recording
 from cosim.delivery.experiment import of_recording, sines, with_experiment
+from cosim.experiments.run import Outcome
 from cosim.fmi.domain import KEY, Domain, domains_of, entries_of
 from cosim.fmi.manifest import manifest_of
 from cosim.fmi.own_starts import MEMBER, as_member, own_starts
 from cosim.master.proven import Proven
 from cosim.master.session import OutsideProvenRangeWarning
+from cosim.models.maps import WIDTH, curve, curves_in, maps_of
 from cosim.system.ports import PortRef
 from cosim_calibration.left_behind import MANIFEST, left_behind
 from pyfmi_models.card import read_card
 from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects.learned import LearnedTorque
 from pyfmi_models.export import export_fmu
 from pyfmi_models.export.related import identified as identified_as
 from pyfmi_models.export.related import references
@@ -50,10 +56,16 @@ def identified(fmu, tmp_path_factory) -> Path:
     return done.files["fmu"]
 
 
+def passed(fmu: Path) -> Outcome:
+    """What the only experiment of an FMU comes to, which passes."""
+    done = cosim.check(fmu)
+    assert done.passed, str(done)
+    (outcome,) = done.checked.outcomes
+    return outcome
+
+
 def test_an_identified_fmu_carries_the_recording_kept_out_and_passes_its_own_check(identified):
-    checked = cosim.check(identified)
-    assert checked.passed, str(checked)
-    (outcome,) = checked.checked.outcomes
+    outcome = passed(identified)
     assert outcome.experiment.name == "heldout 1"
     assert [one.name for one in outcome.compared] == ["w", "phi"]
     assert len(outcome.times) == 150
@@ -75,9 +87,7 @@ def test_the_manifest_keeps_its_other_entries_and_a_second_identification_replac
     again = manifest_of(done.files["fmu"])
     assert [one.main_role for one in again.related].count("experiment") == 1
     assert f"{FOLDER}/page.html" in [one.member for one in again.related]
-    checked = cosim.check(done.files["fmu"])
-    assert checked.passed, str(checked)
-    assert "fitted" in checked.checked.outcomes[0].experiment.description
+    assert "fitted" in passed(done.files["fmu"]).experiment.description
 
 
 def test_an_fmu_whose_number_was_changed_afterwards_fails(identified, tmp_path):
@@ -125,10 +135,8 @@ def test_an_exported_fmu_passes_the_experiment_that_it_carries_and_equal_cards_g
     once, again = (cosim.export("emps", tmp_path / name, fmi=3) for name in ("once", "again"))
     for path, same in zip(once.fmus, again.fmus, strict=True):
         assert path.read_bytes() == same.read_bytes()
-        done = cosim.check(path)
-        assert done.passed, str(done)
-        assert done.checked.outcomes[0].compared
-        assert done.checked.standard == "FMI-LS-REF 1.0.0-beta.1"
+        assert passed(path).compared
+        assert manifest_of(path).version == "1.0.0-beta.1"
 
 
 def test_the_torque_of_a_recording_is_the_stimulus_and_what_was_measured_lies_beside(tmp_path):
@@ -138,9 +146,7 @@ def test_the_torque_of_a_recording_is_the_stimulus_and_what_was_measured_lies_be
     stimulus = of_recording(Recording("night", table), model)
     path = tmp_path / "improved.fmu"
     with_experiment(lambda related: export_fmu(model, path, fmi=3, force=True, related=related), stimulus)
-    done = cosim.check(path)
-    assert done.passed, str(done)
-    assert done.checked.outcomes[0].experiment.name == "night"
+    assert passed(path).experiment.name == "night"
     with zipfile.ZipFile(path) as archive:
         measured = archive.read(f"{FOLDER}/measured.csv").decode().splitlines()
         assert measured[0] == "time,q"
@@ -183,7 +189,7 @@ def proven(fmu, tmp_path_factory) -> Path:
     return folder
 
 
-def test_a_run_says_the_first_time_and_variable(proven):
+def test_a_run_says_the_first_time_and_variable_and_a_signal_that_feeds_two_is_proven_for_both(proven):
     done = cosim.run(proven / "system.toml")
     outside = done.statistics["outside"]
     assert [one.split(" leaves")[0] for one in outside] == ["a.speed", "a.i"], "the first one first"
@@ -194,6 +200,9 @@ def test_a_run_says_the_first_time_and_variable(proven):
     assert outside[0] in str(done)
     assert list(done.recording.columns) == ["t", "phi"], "nothing more is recorded"
     assert cosim.run(proven / "system.toml", stop=0.5).statistics["outside"] == [], "within it nothing is said"
+    rows = {row["signal"]: row for row in cosim.show(proven / "system.toml").tables["proven for"]}
+    assert rows["u.position"] == {"signal": "u.position", "proven": "-3 to 3 A", "for": "a, b"}, "b allows 6 A of it"
+    assert rows["a.speed"]["proven"] == "-60 to 60 rpm"
 
 
 def test_a_system_in_hand_says_it_while_it_is_stepped_and_warns_at_the_end(proven):
@@ -223,12 +232,6 @@ def test_a_sweep_says_which_run_leaves_it_first(proven, tmp_path):
     reasons = done.frame()["reason"].tolist()
     assert [bool(one) for one in reasons] == [False, True, True]
     assert done.frame()["status"].tolist() == ["ok"] * 3
-
-
-def test_ranges_of_a_system_are_intersected_where_one_signal_feeds_both(proven):
-    rows = {row["signal"]: row for row in cosim.show(proven / "system.toml").tables["proven for"]}
-    assert rows["u.position"] == {"signal": "u.position", "proven": "-3 to 3 A", "for": "a, b"}, "b allows 6 A of it"
-    assert rows["a.speed"]["proven"] == "-60 to 60 rpm"
 
 
 def test_a_card_states_its_range_and_its_fmu_carries_it(tmp_path):
@@ -273,3 +276,53 @@ def test_the_value_farthest_outside_is_told_on_whichever_side_the_range_was_left
     watched = Proven(PortRef("a.w"), -2.0, 6.0, "rad/s")
     watched.see(np.arange(float(len(values))), np.array(values))
     assert f"at 0 s: {values[0]} rad/s, proven -2 to 6; at most it is {farthest}." in str(watched)
+
+
+# Maps of learned terms.
+
+ONE = LearnedTorque(over="position", seen=(-1.0, 1.0), torque=(0.0, 0.2))
+TWO = replace(ONE, by="speed", by_seen=(0.0, 2.0), waves=(1, 1), torque=(0.1, 0.0, 0.0, 0.3))
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Path:
+    path = tmp_path / "learned.toml"
+    path.write_text(card_text(replace(read_card("paper_mount"), effects=(ONE, TWO), controller=None)))
+    return path
+
+
+def test_a_map_has_the_values_of_the_term_at_its_breakpoints(card: Path) -> None:
+    first, second = maps_of(read_card(card))
+    np.testing.assert_allclose(first["value"], 0.2 * np.cos(np.pi * (np.array(first["at"]) + 1) / 2), atol=1e-12)
+    assert (first["unit"], first["kind"]) == ("N.m", "torque")
+    assert np.shape(second["value"]) == (len(second["at"]), len(second["by_at"]))
+
+
+@pytest.mark.parametrize("content", ["[]", "{", '{"format": "mount-cosim maps 1"}', '{"format": "x", "maps": [1]}'])
+def test_a_file_that_only_has_the_name_of_our_maps_draws_nothing(content: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+        archive.writestr("extra/maps.json", content)
+    assert curves_in(tmp_path / "a.fmu", "extra/maps.json") == []
+
+
+def test_an_fmu_carries_its_maps_is_shown_with_them_and_stays_valid(card: Path, tmp_path: Path) -> None:
+    (path,) = cosim.export(card, tmp_path / "out", fmi=3).fmus
+    rows = cosim.show(card).tables["learned maps"]
+    assert (rows[0]["curve"][0], rows[0]["curve"][-1], rows[0]["values"]) == ("█", "▁", "-0.2 to 0.2 N.m")
+    assert len(rows) == 1 + 5, "the map of two quantities at five values of the second"
+    assert "learned maps" not in cosim.show("emps").tables
+    assert cosim.show(path).tables["learned maps"] == rows
+    assert not validate_fmu(path)
+    with zipfile.ZipFile(path) as archive:
+        folder = "extra/org.fmi-standard.fmi-ls-ref/"
+        told = json.loads(archive.read(f"{folder}maps.json"))
+        assert b"maps.json" in archive.read(f"{folder}fmi-ls-manifest.xml")
+    assert [one["name"] for one in told["maps"]] == ["learned", "learned2"]
+
+
+def test_a_map_is_drawn_from_end_to_end_in_one_line() -> None:
+    assert curve([2.0, 2.0]) == "▁▁"
+    drawn = curve([float(k) for k in range(101)])
+    assert len(drawn) == WIDTH
+    assert (drawn[0], drawn[-1]) == ("▁", "█")
+    assert list(drawn) == sorted(drawn)

@@ -118,12 +118,7 @@ def listing(kind: str, source: str, role: str = "experiment") -> dict[str, str]:
         ({}, listing(OURS, "b.exp"), True, r'names "b.exp" \(experiment\), which is not in the archive'),
         ({}, {"a.exp": experiments().replace("test-ref", "nothing")}, False, "nothing.csv"),
         ({}, {"test-in.csv": "time,i\n0,nan\n2,1\n"}, False, "The stimulus has no number for i at 0 s"),
-        (
-            {},
-            {"test-in.csv": "time,i\n5,0\n6,1\n"},
-            False,
-            "The stimulus is from 5 to 6 s, and .* from 0 to 2 s",
-        ),
+        ({}, {"test-in.csv": "time,i\n5,0\n6,1\n"}, False, "The stimulus is from 5 to 6 s, and .* from 0 to 2 s"),
         ({}, {"test-ref.csv": "time,w,w\n0,0,1\n2,1,3\n"}, False, 'has two columns "w"'),
         ({}, {"a.exp": OF_HDF}, True, "its References are of type application/x-hdf, and only text/csv is read here"),
         ({}, {"test-ref.csv": "\x89HDF\0\0"}, False, "test-ref.csv is no CSV but binary"),

@@ -97,7 +97,6 @@ class Master:
 
     def config_map(self) -> int:
         slave = self.slaves[0]
-        assert slave.config_func is not None
         slave.config_func(0)
         sizes = {side: sum(size for _, size in slave.mapped(side)) for side in (0x1C12, 0x1C13)}
         slave.output, slave.input = bytes(sizes[0x1C12] + self.more[0]), bytes(sizes[0x1C13] + self.more[1])

@@ -98,21 +98,12 @@ def spawned(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         process.communicate()
 
 
-def line_of(process: subprocess.Popen[bytes]) -> bytes:
-    assert process.stdout is not None
-    return process.stdout.readline()
-
-
 def faults_when_python_is_killed(folder: Path) -> set[str]:
     """Kill the Python of a session in operation: the loop leaves, without torque, its record replays; its faults."""
     with drive(PATIENT, lockstep=False) as there:
-        code = SUPERVISOR.format(
-            tests=[str(Path(__file__).parent), str(Path(__file__).parents[1] / "tools")],
-            url=there.url,
-            box=str(folder / "box"),
-        )
-        with spawned("-c", code) as process:
-            loop = int(line_of(process))
+        tests = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tools")]
+        with spawned("-c", SUPERVISOR.format(tests=tests, url=there.url, box=str(folder / "box"))) as process:
+            loop = int(process.stdout.readline())
         try:
             until(lambda: not Path(f"/proc/{loop}").exists())
         except AssertionError:
@@ -140,7 +131,7 @@ def drive_process(tmp_path: Path, port: int, *options: str) -> Iterator[subproce
     (tmp_path / "s.toml").write_text(SCENARIO, "utf-8")
     verb = ("-m", "cosim", "hardware", "virtual-drive", str(tmp_path / "s.toml"), "--port", str(port), "--json")
     with spawned(*verb, *options) as process:
-        assert json.loads(line_of(process)) == {"what": "state", "state": "not ready", "torque": 0.0}
+        assert json.loads(process.stdout.readline()) == {"what": "state", "state": "not ready", "torque": 0.0}
         yield process
 
 

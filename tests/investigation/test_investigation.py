@@ -1,6 +1,7 @@
 """The loop that asks the machine: it decides, it keeps to its limits, and a kill loses nothing."""
 
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,8 @@ from cosim_investigation.investigate import investigate
 from cosim_investigation.machine import CoSimulated
 from cosim_investigation.motions import Motion
 from cosim_investigation.page import write_page
-from cosim_investigation.story import Moved
+from cosim_investigation.rounds import Rounds
+from cosim_investigation.story import Answered, Moved, Story
 from cosim_investigation.verb import seconds_of
 from pyfmi_models.card import read_card
 
@@ -110,7 +112,6 @@ def test_a_limit_left_on_the_way_is_the_end_is_said_and_is_kept(tmp_path, monkey
     done = investigate(*given[:2], out, machine=given[2], budget=100, seconds=10, limits=LIMITS)
     assert done.story.ended == "limit left"
     last = done.story.steps[-1]
-    assert isinstance(last, Moved)
     assert (last.number, last.left.partition(" ")[0]) == (3, "position")
     assert (out / last.file).exists()
     assert "LEFT position" in str(done)
@@ -157,3 +158,58 @@ def test_a_recording_of_a_proof_is_another_one(tmp_path: Path) -> None:
     np.savetxt(path, np.c_[t, np.sin(t), np.cos(t)], delimiter=",", header="t,q,tau", comments="")
     with pytest.raises(InputError, match="run is held out and among the training recordings"):
         investigate(*given[:2], tmp_path / "out", train=path, heldout=path)
+
+
+# Progress of an investigation: stages count up to at most so many, the best answer is kept, the time comes down.
+
+DIAGNOSIS = ("refitting the base", "Delay (1 of 2)", "proving on the recording that was not fitted")
+
+
+def answer(after: float, *names: str) -> Answered:
+    return Answered(0, names, (), (), 0.8, after, 0.1, 1.0)
+
+
+def lines(budget: float = 60.0) -> list[str]:
+    """What is told of three rounds of two motions of 10 s; each call takes 2 s."""
+    said: list[str] = []
+    rounds = Rounds(said.append, budget, 10.0, lambda: 2.0 * len(said))
+    for number, found in enumerate((answer(0.3, "cogging"), answer(0.2, "cogging", "delay"), answer(0.5))):
+        for role in ("train", "heldout"):
+            rounds("moving: a sweep")
+            rounds.step(Moved(number, "x.parquet", role, "sweep", "a sweep", 10.0))
+        for text in DIAGNOSIS:
+            rounds(text)
+        rounds.step(found)
+        if number < 2:
+            rounds("designing the next motion")
+    return said
+
+
+def test_stages_count_up_the_best_answer_so_far_stays_and_the_time_to_go_comes_down() -> None:
+    said = lines()
+    told = [re.match(r"stage (\d+) of (?:at most )?(\d+): ", line) for line in said]
+    numbers, most = zip(*[(int(one[1]), int(one[2])) for one in told if one], strict=True)
+    assert list(numbers) == sorted(numbers)
+    assert set(most) == {8}  # three rounds: move, diagnose, design; the last ends with its diagnosis
+    assert numbers[-1] == 8
+    assert said[-1].startswith("stage 8 of 8: ")
+    assert "of at most 17: " in lines(120.0)[0]
+    # the best answer, when a worse one comes
+    assert "best so far" not in said[0]
+    assert "best so far: cogging, validation error 0.8 -> 0.3" in said[6]
+    assert "best so far: cogging, delay, validation error 0.8 -> 0.2" in said[-1]
+    # the time to go, in later rounds
+    assert "left" not in said[0]
+    left = [int(found[1]) for line in said if (found := re.search(r"at most about (\d+) s left", line))]
+    assert left[-1] < left[0]
+    assert 0 < left[-1] <= 6
+
+
+def test_a_name_that_is_one_of_a_set_heads_nothing_alone() -> None:
+    """The heading names the rivals; that a sure answer was not found twice is no rival."""
+    first = answer(0.3, "cogging")
+    rivals = Answered(
+        1, ("cable_wrap",), ("cable wrap or gravity unbalance", "once more"), ("set", "unconfirmed"), 1, 1, 1, 1
+    )
+    assert Story((first, rivals), "budget spent").answer == "Cable wrap (open: cable wrap or gravity unbalance)"
+    assert Story((rivals, first), "budget spent").answer == "Cogging"

@@ -1,5 +1,9 @@
-"""Which motion tells two structures apart: the one on which they differ after a refit, whichever of them is right."""
+"""Which motion tells two structures apart: the one on which they differ after a refit, whichever of them is right.
 
+The next experiment of a diagnosis differs most where the rival cannot follow, and stays where the axis has been.
+"""
+
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,16 +11,20 @@ import numpy as np
 import pytest
 from investigations import CABLE, written
 
+from cosim.data.recording import Recording
+from cosim.diagnosis.measure import experiment
+from cosim.estimation.prepare import Piece, Prepared, prepare
 from cosim.estimation.problem import Problem
 from cosim.system.scenario import read_scenario
 from cosim_investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare, strayed
-from cosim_investigation.families import creep, fast_sweeps, fast_tone, slow_sweep
+from cosim_investigation.families import creep, fast_sweeps, fast_tone, reversal_ladder, slow_sweep, stop_and_go, tone
+from cosim_investigation.ground import new_ground, visited
 from cosim_investigation.limits import Limits
 from cosim_investigation.machine import CoSimulated
-from cosim_investigation.motions import Rest, room_of
+from cosim_investigation.motions import Motion, Rest, Room, room_of
 from cosim_investigation.questions import Duel, Question, problem_of
 from pyfmi_models.card import read_card
-from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
+from pyfmi_models.effects import CATALOGUE, ActuatorLag, Cogging, Delay, Effect, GravityUnbalance, TorqueOffset
 
 LIMITS = Limits(-1.5, 1.5, 1.0, 3.0, 60.0, 2.4)
 SET, DOUBT = Question("set", ("cable_wrap", "torque_offset"), "set"), Question("uncertain", ("cable_wrap",), "doubt")
@@ -50,7 +58,6 @@ def test_a_long_stroke_tells_a_cable_from_a_weight_and_a_fast_tone_does_not(prob
     told = nats(found)
     assert told["slow sweep"] > 10 * told["fast tone"]
     chosen = best(found.plans, True)
-    assert chosen is not None
     assert chosen.worth == 10.0  # what settles it; of those, the one of most new ground
 
 
@@ -154,3 +161,77 @@ def test_short_moves_are_allowed_by_the_torque_that_they_ask_for_not_by_what_a_l
         hardest.append(20.0 * np.abs(motion.sampled(np.arange(0.0, motion.seconds, 1e-3))[2]).max())
         assert hardest[-1] < torque
     assert hardest[0] > 45.0  # what is allowed with more is not made smaller
+
+
+# The next experiment of a diagnosis.
+
+
+@pytest.fixture(scope="module")
+def night() -> Prepared:
+    t = np.arange(30_000) / 1000
+    q = 0.5 + 0.3 * np.sin(0.5 * t) + 0.002 * np.sin(20 * t)
+    torque = 30 * (-0.075 * np.sin(0.5 * t) - 0.8 * np.sin(20 * t)) + 3
+    return prepare([Recording("night", {"t": t, "tau": torque, "q": q})], 30.0)
+
+
+def test_a_chirp_tells_a_lag_from_a_delay_in_a_scenario_that_cosim_run_reads(night: Prepared, tmp_path: Path) -> None:
+    """Nothing slow does."""
+    card = read_card("paper_mount")
+    lag, delay = (
+        replace(card.plant(), effects=(one,)) for one in (ActuatorLag(time_constant_ms=5.0), Delay(delay_ms=5.0))
+    )
+    found = experiment.best(lag, delay, ("actuator_lag", "delay"), night)
+    assert found.signal.kind in ("chirp", "multisine")
+    assert found.difference > 0.05
+    (tmp_path / "next_experiment.toml").write_text(experiment.scenario(found, card))
+    read = read_scenario(tmp_path / "next_experiment.toml")
+    assert set(read.records) == {"tau", "q", "q_d"}
+    assert read.stop == 40.0
+    assert experiment.in_words(found, True)["scenario"] == "next_experiment.toml"
+    assert "scenario" not in experiment.in_words(found, False)
+
+
+def test_what_a_rival_can_imitate_is_no_difference(night: Prepared) -> None:
+    base = read_card("paper_mount").plant()
+    one, other = (replace(base, effects=(TorqueOffset(torque=torque),)) for torque in (0.5, 0.1))
+    found = experiment.best(one, other, ("torque_offset", "torque_offset"), night)
+    assert found is None or found.difference < 1e-6
+
+
+def test_motions_stay_where_the_axis_has_been(night: Prepared) -> None:
+    low, high = night.ranges["q"]
+    base = read_card("paper_mount").plant()
+    ripple = replace(base, effects=(Cogging(cycles_per_rev=20, amplitude=0.5, phase=0.0),))
+    found = experiment.best(ripple, base, ("cogging", "none"), night)
+    for _, signal in experiment.motions(found.visited):
+        q = found.visited.middle + signal.stream(0.01)(np.arange(4000))[0]
+        assert low - 1e-9 <= q.min() <= q.max() <= high + 1e-9
+
+
+# What counts as new ground: each kind of motion that no recording held, not only places and speeds.
+
+CUTOFF = 30.0
+
+
+def piece(family: Callable[[Room], Motion]) -> Piece:
+    found, left = piece_of(family(room_of(LIMITS, 0.0, 12.0, 1, False)), 0.0, CUTOFF, LIMITS)
+    assert not left
+    return found
+
+
+def ground(family: Callable[[Room], Motion], *known: Callable[[Room], Motion]) -> float:
+    before = Prepared(tuple(map(str, known)), tuple(map(piece, known)), CUTOFF, True)
+    return new_ground(piece(family), visited(before, LIMITS), LIMITS)
+
+
+@pytest.mark.parametrize("family", [tone, stop_and_go, slow_sweep, reversal_ladder])
+def test_the_same_motion_again_is_no_new_ground(family: Callable[[Room], Motion]) -> None:
+    assert ground(family, family) == 0.0
+
+
+def test_rests_and_smaller_strokes_are_new_ground_where_nothing_rested_and_all_were_long() -> None:
+    assert ground(stop_and_go, tone, fast_tone) > 0.3
+    assert ground(stop_and_go, tone, fast_tone) > ground(fast_tone, tone) + 0.1
+    seen = ground(reversal_ladder, slow_sweep, stop_and_go)
+    assert seen > ground(reversal_ladder, slow_sweep, stop_and_go, reversal_ladder) == 0.0
+    assert np.isclose(ground(reversal_ladder, reversal_ladder, tone), 0.0)

@@ -103,7 +103,6 @@ def test_shipped_scenarios_have_the_bits_of_their_run(name: str, tmp_path: Path)
 
 def test_an_ssp_becomes_one_fmu_that_is_valid_and_runs_in_our_master_too(tmp_path: Path) -> None:
     ssp = export("paper_mount", tmp_path / "a", fmi=3, ssp=True).ssp
-    assert ssp is not None
     done = export(ssp, tmp_path / "b", as_fmu=True)
     assert [one.name for one in done.fmus] == ["paper_mount_fmi2.fmu", "paper_mount_fmi3.fmu"]
     assert not [problem for path in done.fmus for problem in validate_fmu(path)]
@@ -117,8 +116,6 @@ def test_an_ssp_becomes_one_fmu_that_is_valid_and_runs_in_our_master_too(tmp_pat
         ticks=inside.ticks,
     )
     one, other = simulate(inside).recording, simulate(whole).recording
-    assert one is not None
-    assert other is not None
     for column in names:
         np.testing.assert_array_equal(one[column], other[column])
 
@@ -132,7 +129,6 @@ def test_inputs_and_parameters_come_from_outside(tiny: Tiny, tmp_path: Path) -> 
     rows = fmu.run(["mass.y", "spring.y"], TICKS, inputs={"mass.a": push})
     fmu.close()
     recording = simulate(oscillator(tiny[3], signals={"r": push}, parameters={"mass": {"k": 1.5}})).recording
-    assert recording is not None
     np.testing.assert_array_equal(recording["v"], rows["mass.y"][:TICKS])
     np.testing.assert_array_equal(recording["x"], rows["spring.y"][:TICKS])
 

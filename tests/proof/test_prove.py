@@ -68,7 +68,7 @@ def test_a_list_of_decks_keeps_every_line_and_says_what_is_not_fresh(tmp_path: P
     assert {one.purpose for one in kept} == {"tuning", "scoring"}
 
 
-def test_a_truth_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
+def test_neither_a_truth_nor_an_answer_can_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
     assert canonical({"b": 1, "a": [1.5]}) == canonical({"a": [1.5], "b": 1}) == '{"a":[1.5],"b":1}'
     truth = {"verdict": ["cogging"], "effects": [{"amplitude": 0.1 + 0.2}]}
     salt = salt_of(5, 0)
@@ -87,9 +87,6 @@ def test_a_truth_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> 
         file.write('{"run": 1, "se')  # cut short: it is written again
     Seals(tmp_path / "seals.jsonl").write(1, "b" * 64)
     assert Seals(tmp_path / "seals.jsonl").known == {0: seal(truth, salt), 1: "b" * 64}
-
-
-def test_an_answer_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
     row = {"run": 0, "answer": {"verdict": ["cogging"], "share": 0.1 + 0.2, "gap": float("nan")}, "status": "ok"}
     Seals(tmp_path / "seals.jsonl").write_answer(row)
     seals = Seals(tmp_path / "seals.jsonl")
@@ -123,10 +120,8 @@ def test_what_a_diagnosis_says_is_what_is_scored() -> None:
     assert set(baselines.compared(found.traces, names=("refit", "kernel"))) == {"refit", "kernel"}
 
 
-def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv(
-        "PYTHONPATH", str(Path(__file__).parent)
-    )  # the process of the tool imports what stands in for it
+def test_a_proof_goes_on_where_it_ended_leaves_complete_files_and_those_of_others_alone(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))  # the tool's process imports what stands in for it
     told: list[str] = []
     wanted = {"workers": 1, "tool": cautious, "on_seal": told.append}
     out = tmp_path / "proof"
@@ -148,13 +143,11 @@ def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path, monk
         conduct(Benchmark(5, 2, 10.0), out, **wanted)
     crashed = conduct(Benchmark(5, 1, 10.0), tmp_path / "crashed", workers=1, tool=crashing)["rows"][0]
     assert (crashed["status"], "code 3" in crashed["reason"]) == ("crashed", True)  # a row, and not the end
-
-
-def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "README.md").write_text("mine")
+    (mine := tmp_path / "mine").mkdir()
+    (mine / "README.md").write_text("mine")
     with pytest.raises(OutputError, match=r"README.md exists already; give --force"):
-        conduct(Benchmark(5, 1, 10.0), tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
+        conduct(Benchmark(5, 1, 10.0), mine)
+    assert [path.name for path in mine.iterdir()] == ["README.md"]
 
 
 @pytest.mark.parametrize(

@@ -42,11 +42,6 @@ def base(workshop: Workshop) -> dict[str, float]:
     return ise(workshop, condition("base"))
 
 
-def test_many_jobs_go_to_many_processes_and_keep_their_order() -> None:
-    with everywhere(8) as spread:
-        assert list(spread(abs, [-k for k in range(8)])) == list(range(8))
-
-
 def _interrupted() -> None:
     with everywhere(8) as spread:
         spread(time.sleep, [3600.0] * 8)  # longer than a test may take
@@ -59,7 +54,9 @@ def _ended(_: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_an_interrupt_or_an_end_from_outside_is_told_without_a_traceback(capfd: pytest.CaptureFixture[str]) -> None:
+def test_many_processes_keep_the_order_of_jobs_and_an_end_from_outside_is_told_without_a_traceback(capfd) -> None:
+    with everywhere(8) as spread:
+        assert list(spread(abs, [-k for k in range(8)])) == list(range(8))
     with pytest.raises(KeyboardInterrupt):
         _interrupted()
     with pytest.raises(CosimError, match=r"was ended from outside, or had no memory left"), everywhere(8) as spread:
@@ -181,9 +178,7 @@ def written(identified: Identification, tmp_path_factory: pytest.TempPathFactory
     return write(tmp_path_factory.mktemp("out"), results, command="cosim paper")
 
 
-def test_table_4_is_as_the_contract_says_and_each_small_file_is_on_the_page_with_what_is_not_as_expected(
-    written,
-) -> None:
+def test_table_4_is_as_the_contract_says_and_the_page_names_all_files_and_what_is_not_as_expected(written) -> None:
     folder = written.files[0].parent
     table = json.loads((folder / "table4.json").read_text())
     assert table == written.table

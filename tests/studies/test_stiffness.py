@@ -159,10 +159,7 @@ def test_the_picture_has_a_line_for_each_method_and_says_the_limits(tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("card", "message"),
-    [
-        ("nope", "nope: no such card."),
-        ("emps", 'emps: [friction] model is "coulomb"; only "lugre" has a stiff state'),
-    ],
+    [("nope", "nope: no such card."), ("emps", 'emps: [friction] model is "coulomb"; only "lugre" has a stiff state')],
 )
 def test_the_command_ends_with_one_sentence(card, message, tmp_path, capsys) -> None:
     with pytest.raises(SystemExit) as caught:

@@ -65,7 +65,6 @@ def both(system: System, folder: Path, fmi: int, every: int = 1) -> tuple[Rows, 
     """Recorded outputs of a run, and the same from the FMU; each has what the columns of the system are called."""
     named = {column: str(record.signal) for column, record in system.records.items()}
     recording = simulate(system).recording
-    assert recording is not None
     fmu = nested(system, folder, fmi)
     fmu.start()
     rows = fmu.run(list(named.values()), system.ticks // every, every)

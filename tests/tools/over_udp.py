@@ -12,7 +12,7 @@ from on_hardware import SIMULATED, scenario
 from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.session import Session
 from cosim.hardware.simulated import Plant
-from cosim.hardware.udp import FRAME, HELLO, MAGIC, WELCOME, UdpDrive, closed, key_of, opened, sealed
+from cosim.hardware.udp import FRAME, HELLO, MAGIC, WELCOME, closed, key_of, opened, sealed
 from cosim.hardware.virtual import VirtualDrive
 from cosim.hardware.wired import wire_up
 
@@ -52,7 +52,6 @@ def session(folder: Path, url: str, given: Machine = SIMULATED, stop: float = 0.
 
 def impatient(one: Session, milliseconds: int = 10) -> Session:
     """Wait for an answer that does not come for so long only."""
-    assert isinstance(one.transport, UdpDrive)
     one.transport.udp.patience = milliseconds * 1_000_000
     return one
 

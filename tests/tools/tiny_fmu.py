@@ -85,8 +85,9 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     return {version: build(directory, version) for version in (2, 3)}
 
 
-VARIABLES = [
-    # name, causality, unit, start, limits
+Row = tuple[str, str, str, str, str]
+"""Name, causality, unit, start and limits of a variable."""
+VARIABLES: list[Row] = [
     ("a", "input", "rad", "0", ""),
     ("b", "input", "rad", "0", ""),
     ("k", "parameter", "1", "1", 'min="0"'),
@@ -113,33 +114,33 @@ def described(fmu: Path, path: Path, xml: str) -> Path:
     return path
 
 
-def description(version: int, *, direct: bool = False, state: bool = True, can_vary_step: bool = True) -> str:
-    """Write the XML of one FMI version.
+def description(version, variables=VARIABLES, model="tiny", *, direct=False, state=True, can_vary_step=True) -> str:
+    """Write the XML of one FMI version; the value references of variables are their places.
 
-    `direct`: y follows a and b at once; `state`: it can be saved; `can_vary_step`: steps may differ in length.
+    `direct`: outputs follow a and b at once; `state`: it can be saved; `can_vary_step`: steps may differ in length.
     """
-    head = {
-        2: '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">',
-        3: '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">',
-    }
+    token = "guid" if version == 2 else "instantiationToken"
     known = {2: "1 2", 3: "0 1"}[version] if direct else ""
-    outputs = {
-        2: f'<Outputs><Unknown index="7" dependencies="{known}"/></Outputs>',
-        3: f'<Output valueReference="6" dependencies="{known}"/>',
-    }
+    places = [place for place, row in enumerate(variables) if row[1] == "output"]
+    outputs = "".join(f'<Output valueReference="{place}" dependencies="{known}"/>' for place in places)
+    if version == 2:
+        unknown = "".join(f'<Unknown index="{place + 1}" dependencies="{known}"/>' for place in places)
+        outputs = f"<Outputs>{unknown}</Outputs>"
     saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="{str(state).lower()}"'
     saves += f' canHandleVariableCommunicationStepSize="{str(can_vary_step).lower()}"'
-    units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
-    rows = "".join(_variable(version, number, *row) for number, row in enumerate(VARIABLES))
+    units = "".join(f'<Unit name="{unit}"/>' for unit in dict.fromkeys(row[2] for row in variables))
+    rows = "".join(_variable(version, number, *row) for number, row in enumerate(variables))
     return (
-        f'{head[version]}<CoSimulation modelIdentifier="tiny" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
-        f"<ModelVariables>{rows}</ModelVariables><ModelStructure>{outputs[version]}</ModelStructure></fmiModelDescription>"
+        f'<fmiModelDescription fmiVersion="{version}.0" modelName="{model}" {token}="t">'
+        f'<CoSimulation modelIdentifier="{model}" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
+        f"<ModelVariables>{rows}</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
     )
 
 
 def _variable(version: int, number: int, name: str, causality: str, unit: str, start: str, limits: str) -> str:
     variability = "fixed" if causality == "parameter" else "continuous"
     common = f'name="{name}" valueReference="{number}" causality="{causality}" variability="{variability}"'
+    common += ' initial="exact"' if causality == "output" and start else ""
     value = f'unit="{unit}" {limits}' + (f' start="{start}"' if start else "")
     return (
         f"<Float64 {common} {value}/>" if version == 3 else f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"

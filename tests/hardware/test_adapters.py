@@ -1,4 +1,7 @@
-"""A drive on EtherCAT: the bytes of its process data, its way up, and what is refused or noticed on the bus."""
+"""Adapters in Python: one of the user's is a drive like any other, and so is a drive on EtherCAT.
+
+What an adapter raises is a fault. On the bus: the bytes of process data, the way up, what is refused or noticed.
+"""
 
 import sys
 import tomllib
@@ -9,15 +12,153 @@ from typing import Any
 import fake_soem
 import numpy as np
 import pytest
-from on_hardware import SIMULATED, assert_safe, recorded, scenario
+from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
 from pydantic import ValidationError
 
-from cosim.hardware.machine import Machine, changed, parse_machine
+from cosim.hardware.machine import Machine, changed, parse_machine, read_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
-from cosim.support.errors import HardwareError, MissingPackageError
+from cosim.support.errors import CosimError, HardwareError, MissingPackageError
 from cosim_ethercat.drive import CHECKED_EVERY, FRAME_US, STATE_US, TRIES
 from cosim_ethercat.mapping import Entry, Ethercat, Layout
+
+LIMITS = "[limits]\n" + "".join(f"{name} = {value}\n" for name, value in SIMULATED.limits.model_dump().items())
+"""As a machine file has them."""
+DRIVE = """
+from cosim.hardware.python_adapter import PythonAdapter, Order, Reading
+
+UP = {6: 0x21, 7: 0x23, 15: 0x27, 0: 0x40}
+FIRST = 2**32 - 100
+
+class Wall(PythonAdapter):
+    '''A drive that goes up as it is told and whose axis rests whatever the torque; `later`: after 2000 samples.'''
+
+    log = []
+
+    def __init__(self, step):
+        super().__init__(step)
+        self.samples, self.torque, self.word, self.closed = FIRST, 0.0, 0x40, False
+
+    def write(self, order):
+        self.asked("write", None)
+        self.log.append((order.tick, order.controlword, order.torque))
+        enabled = order.controlword == 15
+        self.word, self.torque = UP.get(order.controlword, 0x40), order.torque if enabled else 0.0
+
+    def read(self):
+        self.samples += 1
+        return self.asked("read", Reading(-1, self.samples, self.word, self.torque))
+
+    def status(self):
+        return self.asked("status", super().status())
+
+    def asked(self, what, answer):
+        return answer if self.samples <= FIRST + 2000 else self.later(what, answer)
+
+    def later(self, what, answer):
+        return answer
+
+    def close(self):
+        self.closed = True
+
+class Failing(Wall):
+    def later(self, what, answer):
+        raise OSError(f"no {what}")
+
+class Mute(Wall):
+    later = lambda self, what, answer: 1 / 0 if what == "write" else answer
+
+class Lost(Wall):
+    later = lambda self, what, answer: {}["state"] if what == "status" else answer
+
+class Unwell(Wall):
+    later = lambda self, what, answer: 2 if what == "status" else answer
+
+class Sleepy(Wall):
+    later = lambda self, what, answer: None if what == "read" else answer
+
+class Nothing:
+    pass
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "drive.py"
+    path.write_text(DRIVE, "utf-8")
+    return path
+
+
+def of_python(tmp_path: Path, kind: str) -> Session:
+    given = changed(SIMULATED, "test", adapter=f"{tmp_path / 'drive.py'}:{kind}")
+    return Session(scenario(), given, tmp_path / "box", fast=True)
+
+
+def test_orders_reach_an_adapter_in_python_and_its_readings_the_loop(tmp_path: Path, file: Path) -> None:
+    with of_python(tmp_path, "Wall") as one:
+        log = one.transport.one.log  # type: ignore[attr-defined]
+        done = run_session(one)
+    assert (done["completed"], "adapter_error" in done) == (True, False)
+    assert (one.transport.python, one.transport.one.closed) == (True, True)  # type: ignore[attr-defined]
+    found = recorded(tmp_path)
+    orders = np.array(log)
+    assert np.array_equal(orders[1:-1, 2], found["machine.order"][:-1]), "an order acts one tick after its sample"
+    assert orders[-1, 1] == orders[-1, 2] == 0, "the last order is zero"
+    assert found["machine.order"].any()
+    assert np.all(found["machine.counts"] == 2**32 - 1), "counts are taken modulo 2^32"
+    assert np.all(np.diff(found["machine.encoder"]) % 2**32 == 1), "and so are samples"
+    assert replay(found).identical
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault", "within", "error"),
+    [
+        ("Failing", "adapter_failed", 2, "OSError: no read"),
+        ("Mute", "adapter_failed", 2, "ZeroDivisionError: division by zero"),
+        ("Lost", "adapter_failed", 2, "KeyError: 'state'"),
+        ("Unwell", "adapter_failed", 2, None),
+        ("Sleepy", "frame_lost", 4, None),
+    ],
+)
+def test_an_adapter_that_fails_or_falls_silent_is_a_fault_and_what_it_raised_first_is_told(
+    tmp_path: Path, file: Path, kind: str, fault: str, within: int, error: str | None
+) -> None:
+    with of_python(tmp_path, kind) as one:
+        done = run_session(one)
+    assert fault in done["faults"]
+    assert_safe(recorded(tmp_path), fault, 2000, within)
+    assert done.get("adapter_error") == error
+
+
+@pytest.mark.parametrize(
+    ("adapter", "sentence"),
+    [
+        ("gone.py:Wall", "the file does not exist"),
+        ("drive.py:Gone", 'there is no function "Gone"; there are: '),
+        ("drive.py:Nothing", "is no PythonAdapter"),
+    ],
+)
+def test_what_is_no_adapter_is_refused_in_a_sentence(tmp_path: Path, file: Path, adapter: str, sentence: str) -> None:
+    (tmp_path / "m.toml").write_text(machine_file(adapter), "utf-8")
+    with pytest.raises(CosimError, match=sentence):
+        Session(scenario(), read_machine(tmp_path / "m.toml"), tmp_path / "box")
+    assert not (tmp_path / "box").exists()
+
+
+def machine_file(adapter: str) -> str:
+    late = "[reactions]\nlate_in_a_row = 1000\nlate_in_window = 64\nwindow_ms = 1.0\n"
+    return f'name = "mine"\nadapter = "{adapter}"\n{LIMITS}{late}'
+
+
+def test_in_real_time_the_loop_of_an_adapter_in_python_is_a_thread(tmp_path: Path, file: Path) -> None:
+    (tmp_path / "s.toml").write_text(SCENARIO, "utf-8")
+    (tmp_path / "m.toml").write_text(machine_file("drive.py:Wall"), "utf-8")
+    found = invoke("check", str(tmp_path / "s.toml"), "--machine", str(tmp_path / "m.toml"), "--seconds", "0.05")
+    assert found.exit_code == 0, found.output
+    assert "drive.py:Wall" in found.output
+
+
+# A drive on EtherCAT.
 
 RATED = 100.0
 
@@ -43,14 +184,9 @@ def session(folder: Path, given: Machine | None = None) -> Session:
 
 
 def test_a_layout_is_the_entries_one_after_the_other_little_endian_and_signed_where_they_are() -> None:
-    layout = Layout(
-        [
-            Entry(name="controlword", object=0x6040, bits=16),
-            Entry(object=0x60FE, subindex=1, bits=32),
-            Entry(name="torque", object=0x6071, bits=16),
-            Entry(name="mode", object=0x6060, bits=8),
-        ]
-    )
+    named = [("controlword", 0x6040, 16), ("torque", 0x6071, 16), ("mode", 0x6060, 8)]
+    entries = [Entry(name=name, object=index, bits=bits) for name, index, bits in named]
+    layout = Layout([entries[0], Entry(object=0x60FE, subindex=1, bits=32), *entries[1:]])
     raw = layout.pack({"controlword": 0x800F, "torque": -2, "mode": 10})
     assert raw == bytes.fromhex("0f80 00000000 feff 0a")
     assert layout.unpack(raw) == {"controlword": 0x800F, "torque": -2, "mode": 10}
@@ -65,11 +201,6 @@ def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_a
     assert Ethercat(**shown) == default
     assert default.model_fields_set == {"rated_torque"}
     assert shown.keys() == default.model_dump().keys()
-    assert (default.position, default.receive_pdo, default.transmit_pdo) == (0, 0x1600, 0x1A00)
-    assert not default.distributed_clock
-    assert [one.mapped for one in default.outputs] == [0x60400010, 0x60710010, 0x60600008]
-    assert [one.mapped for one in default.inputs] == [0x60410010, 0x60640020, 0x60770010, 0x60610008]
-    assert (Layout(default.outputs).size, Layout(default.inputs).size) == (5, 9)
 
 
 def test_a_drive_on_the_bus_goes_up_gives_torque_in_per_mille_and_comes_down(tmp_path, bus) -> None:
@@ -156,9 +287,8 @@ RATED_ONE = "[ethercat]\nrated_torque = 1.0\n"
     ],
 )
 def test_a_mapping_that_is_none_is_refused(tmp_path, bus, section, sentence) -> None:
-    limits = "\n".join(f"{name} = {value}" for name, value in SIMULATED.limits.model_dump().items())
     entry = section.format('name = "torque", object = 0x6071')
-    text = f'name = "x"\nadapter = "ethercat:fake0"\n[limits]\n{limits}\n{entry}'
+    text = f'name = "x"\nadapter = "ethercat:fake0"\n{LIMITS}{entry}'
     with pytest.raises(HardwareError, match=sentence):
         session(tmp_path, parse_machine(text, "m.toml"))
 
