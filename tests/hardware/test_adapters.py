@@ -12,10 +12,10 @@ from typing import Any
 import fake_soem
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
+from on_hardware import SCENARIO, SIMULATED, altered, assert_safe, invoke, recorded, scenario
 from pydantic import ValidationError
 
-from cosim.hardware.machine import Machine, changed, parse_machine, read_machine
+from cosim.hardware.machine import Machine, parse_machine, read_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
 from cosim.support.errors import CosimError, HardwareError, MissingPackageError
@@ -90,7 +90,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def of_python(tmp_path: Path, kind: str) -> Session:
-    given = changed(SIMULATED, "test", adapter=f"{tmp_path / 'drive.py'}:{kind}")
+    given = altered(adapter=f"{tmp_path / 'drive.py'}:{kind}")
     return Session(scenario(), given, tmp_path / "box", fast=True)
 
 
@@ -173,10 +173,9 @@ def bus(monkeypatch: pytest.MonkeyPatch) -> type[fake_soem.Master]:
     return Fresh
 
 
-def machine(interface: str = "fake0", limits: dict[str, float] | None = None, **ethercat: Any) -> Machine:
-    limits = SIMULATED.limits.model_dump() | {"torque_mismatch": RATED / 1000} | (limits or {})
+def machine(interface: str = "fake0", **ethercat: Any) -> Machine:
     section = {"rated_torque": RATED} | ethercat
-    return changed(SIMULATED, "test", adapter=f"ethercat:{interface}", limits=limits, ethercat=section)
+    return altered(adapter=f"ethercat:{interface}", limits={"torque_mismatch": RATED / 1000}, ethercat=section)
 
 
 def session(folder: Path, given: Machine | None = None) -> Session:

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import call
-from on_hardware import SIMULATED, scenario, session
+from on_hardware import altered, scenario, session
 from pydantic import ValidationError
 
 from cosim.data.recording import Recording
 from cosim.hardware import python_adapter, structures, udp, words
 from cosim.hardware.axis import cycles_of
 from cosim.hardware.loops import period_of
-from cosim.hardware.machine import Inject, changed
+from cosim.hardware.machine import Inject
 from cosim.hardware.move import Move, _inertia, _set_points
 from cosim.hardware.simulated import _injection
 from cosim.hardware.udp import UdpDrive, key_of
@@ -92,9 +92,9 @@ def test_a_time_is_the_nearest_number_of_cycles_and_at_least_one(ms: float, cycl
 
 
 def test_an_axis_and_its_session_have_the_numbers_of_their_files(tmp_path: Path) -> None:
-    reactions = SIMULATED.reactions.model_dump() | {"heartbeat_ms": 30.0, "ramp_ms": 7.0, "window_ms": 400.0}
+    reactions = {"heartbeat_ms": 30.0, "ramp_ms": 7.0, "window_ms": 400.0}
     encoder = {"heads": 4, "apart": 2e-4, "eccentricity": 1e-5}
-    given = changed(SIMULATED, "test", reactions=reactions, encoder=encoder, black_box_seconds=60.0)
+    given = altered(reactions=reactions, encoder=encoder, black_box_seconds=60.0)
     with session(tmp_path, given) as one:
         axis, quantum = one.axis, one.wired.quantum
         assert (axis.ramp, axis.patience, axis.late_window) == (70, 1000, 4000)

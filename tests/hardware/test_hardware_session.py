@@ -18,11 +18,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from on_hardware import SIMULATED
+from on_hardware import SIMULATED, altered
 from over_udp import BYE, SESSION, WORDS, Loop, drive, frame, over, session, talking
 
 from cosim.hardware.library import library
-from cosim.hardware.machine import Machine, changed
 from cosim.hardware.session import run_session
 from cosim.hardware.udp import BUSY, DENIED, HELLO, MAGIC, WELCOME, closed, key_of, sealed
 from cosim.hardware.virtual import Event, VirtualDrive
@@ -37,10 +36,6 @@ def keys(tmp_path: Path) -> tuple[str, str]:
     return str(tmp_path / "a.key"), str(tmp_path / "b.key")
 
 
-def limited(**limits: float) -> Machine:
-    return changed(SIMULATED, "test", limits=SIMULATED.limits.model_dump() | limits)
-
-
 @pytest.mark.parametrize("size", [0, 1, 55, 56, 63, 64, 65, 119, 120, 200, 500])
 def test_the_tag_is_hmac_sha256_as_everybody_makes_it(size: int) -> None:
     dice = random.Random(size)
@@ -52,10 +47,10 @@ def test_the_tag_is_hmac_sha256_as_everybody_makes_it(size: int) -> None:
 def test_with_a_key_that_both_have_a_session_runs_and_with_another_it_is_refused(tmp_path, keys) -> None:
     with drive(over("simulated", key_file=keys[0])) as there:
         with pytest.raises(HardwareError, match="was given another key than this loop"):
-            session(tmp_path / "b", there.url, changed(SIMULATED, "test", key_file=keys[1]))
+            session(tmp_path / "b", there.url, altered(key_file=keys[1]))
         with pytest.raises(HardwareError, match="was given another key than this loop"):
             session(tmp_path / "c", there.url)
-        with session(tmp_path / "a", there.url, changed(SIMULATED, "test", key_file=keys[0])) as one:
+        with session(tmp_path / "a", there.url, altered(key_file=keys[0])) as one:
             assert run_session(one)["completed"]
 
 
@@ -94,7 +89,7 @@ def test_an_order_of_an_earlier_session_is_none_of_a_later_one() -> None:
 
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_a_live_session_is_not_stolen_by_who_has_the_key_too(lockstep: bool) -> None:
-    slow = changed(SIMULATED, "test", watchdog_ms=5000.0)
+    slow = altered(watchdog_ms=5000.0)
     with drive(slow, lockstep=lockstep) as there, talking(there) as loop:
         loop.enable()
         assert loop.greet() == WELCOME, "its own greeting once more, as where the answer was lost"
@@ -133,7 +128,7 @@ def test_an_order_of_the_far_future_or_of_no_time_is_dropped(tick: int) -> None:
 
 
 def test_the_drive_keeps_its_own_torque_whatever_it_is_ordered() -> None:
-    with drive(limited(torque=3.0)) as there, talking(there) as loop:
+    with drive(altered(limits={"torque": 3.0})) as there, talking(there) as loop:
         loop.enable()
         given = [loop.obeyed(5 + n, 15, torque) for n, torque in enumerate((2.5, 3.5, 1e300, -7.0, -3.0))]
         assert given == [2.5, 3.0, 3.0, -3.0, -3.0]
@@ -141,7 +136,7 @@ def test_the_drive_keeps_its_own_torque_whatever_it_is_ordered() -> None:
 
 
 def test_the_drive_keeps_its_own_slew_but_lets_go_of_torque_at_once() -> None:
-    with drive(limited(slew=5_000.0)) as there, talking(there) as loop:  # 0.5 N m a tick of 0.1 ms
+    with drive(altered(limits={"slew": 5_000.0})) as there, talking(there) as loop:  # 0.5 N m a tick of 0.1 ms
         loop.enable()
         given = [loop.obeyed(5 + n, 15, torque) for n, torque in enumerate((2.0, 2.0, 2.0, 0.2, -2.0))]
         assert np.allclose(given, [0.5, 1.0, 1.5, 0.2, -0.3], rtol=0, atol=1e-12)
@@ -149,7 +144,7 @@ def test_the_drive_keeps_its_own_slew_but_lets_go_of_torque_at_once() -> None:
 
 
 def test_the_drive_lets_go_when_it_is_faster_than_its_own_limit() -> None:
-    with drive(limited(speed=1e-4)) as there, talking(there) as loop:
+    with drive(altered(limits={"speed": 1e-4})) as there, talking(there) as loop:
         loop.enable()
         for number in count(5):
             if loop.obeyed(number, 15, 45.0) == 0:
@@ -161,7 +156,7 @@ def test_the_drive_lets_go_when_it_is_faster_than_its_own_limit() -> None:
 
 
 def test_a_flood_of_frames_does_not_keep_a_drive_from_its_watchdog_or_its_end() -> None:
-    fast = changed(SIMULATED, "test", watchdog_ms=50.0)
+    fast = altered(watchdog_ms=50.0)
     with drive(fast, lockstep=False) as there, talking(there) as loop, socket.socket(type=socket.SOCK_DGRAM) as flood:
         flood.connect((there.host, there.port))
         loop.enable()
@@ -213,7 +208,7 @@ NOW = 1_000_000
 @contextmanager
 def from_now_on(watchdog_ms: float) -> Iterator[tuple[VirtualDrive, Loop]]:
     """A drive in operation whose orders began at a late tick."""
-    given = changed(SIMULATED, "test", watchdog_ms=watchdog_ms)
+    given = altered(watchdog_ms=watchdog_ms)
     with drive(given, lockstep=False) as there, talking(there) as loop:
         for sequence, word in enumerate(WORDS, 1):
             loop.obeyed(sequence, word, tick=NOW)
@@ -276,7 +271,7 @@ def test_a_drive_tells_each_change_once_and_what_its_watchdog_took(monkeypatch: 
 @pytest.mark.parametrize("lockstep", [True, False])
 def test_a_drive_counts_in_the_units_of_its_clock(lockstep: bool) -> None:
     """Nanoseconds; a session is free after a second without an order, or the watchdog's time where that is longer."""
-    patient = changed(SIMULATED, "test", watchdog_ms=1500.0)
+    patient = altered(watchdog_ms=1500.0)
     for machine, lease in ((SIMULATED, 1_000_000_000), (patient, 1_500_000_000)):
         with drive(machine, lockstep=lockstep) as there:
             assert there.virtual.period == (0 if lockstep else 100_000)

@@ -10,7 +10,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
-from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario, simulated
+from on_hardware import SCENARIO, SIMULATED, altered, assert_safe, invoke, recorded, scenario, simulated
 from over_udp import AT, SESSION, drive, faulty, frame, impatient, over, session, talking
 
 from cosim.cli.drive import _plant
@@ -161,7 +161,7 @@ def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
 
 
 def test_a_loop_that_is_alive_and_a_port_that_is_taken_are_not_pushed_aside(tmp_path: Path) -> None:
-    slow = changed(SIMULATED, "test", watchdog_ms=5000.0)
+    slow = altered(watchdog_ms=5000.0)
     with drive(slow, lockstep=False) as there, Session(scenario(), over(there.url, slow), tmp_path / "a") as one:
         one.advance(10)
         with pytest.raises(HardwareError, match="taken by another loop"):
@@ -206,14 +206,11 @@ def test_a_loop_without_a_clock_sleeps_as_it_waits_and_one_in_real_time_waits_as
     with drive() as there, session(tmp_path / "fast", there.url) as one:
         assert one.transport.udp.spin == 0  # type: ignore[attr-defined]
         assert one.transport.udp.patience >= 1e9, "a drive without a clock may be a slow computer"  # type: ignore[attr-defined]
-    machine = changed(
-        SIMULATED, "test", clock=SIMULATED.clock.model_dump() | {"answer_us": 300.0, "answer_spin_us": 20.0}
-    )
+    machine = altered(clock={"answer_us": 300.0, "answer_spin_us": 20.0})
     with drive(machine, lockstep=False) as there:
-        one = Session(scenario(), over(there.url, machine), tmp_path / "real")
-        assert (one.transport.udp.patience, one.transport.udp.spin) == (300_000, 20_000)  # type: ignore[attr-defined]
-        with one:
-            pass
+        with Session(scenario(), over(there.url, machine), tmp_path / "real") as one:
+            udp = one.transport.udp  # type: ignore[attr-defined]
+        assert (udp.patience, udp.spin) == (300_000, 20_000)
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from on_hardware import SIMULATED
+from on_hardware import SIMULATED, altered
 
 from cosim.data.recording import Recording
 from cosim.hardware import look as looking
 from cosim.hardware.look import look
-from cosim.hardware.machine import Machine, changed, read_machine
+from cosim.hardware.machine import Machine, read_machine
 from cosim.hardware.replay import _check_ticks
 from cosim.hardware.virtual import plant_of
 from cosim.hardware.wired import _ends, refuse_what_has_no_machine
@@ -50,9 +50,7 @@ RANGES = {
 def with_number(key: str, value: float) -> Machine:
     """The simulated machine with one number changed, read anew."""
     section, _, name = key.rpartition(".")
-    if not section:
-        return changed(SIMULATED, "test", **{name: value})
-    return changed(SIMULATED, "test", **{section: getattr(SIMULATED, section).model_dump() | {name: value}})
+    return altered(**{section: {name: value}} if section else {name: value})
 
 
 @pytest.mark.parametrize("key", RANGES)

@@ -14,9 +14,10 @@ from commands import call
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from investigations import CABLE, on_a_drive, written
+from on_hardware import altered
 
 from cosim.data.recording import Recording
-from cosim.hardware.machine import Machine, changed, read_machine
+from cosim.hardware.machine import Machine, read_machine
 from cosim.hardware.words import ENTERED
 from cosim.support.errors import HardwareError, InputError
 from cosim_investigation.drive import thinned
@@ -146,9 +147,8 @@ RANGE = {"position": "-0.35:0.35"}
 
 
 def drive(**limits: float) -> Machine:
-    own = read_machine("simulated")
     wide = {"speed": 2.0, "following_error": 0.05, "jump": 1e-3, "torque": 60.0} | limits
-    return changed(own, "test", limits=own.limits.model_dump() | wide)
+    return altered(limits=wide)
 
 
 def test_a_drive_is_asked_until_one_answer_is_left(tmp_path: Path) -> None:

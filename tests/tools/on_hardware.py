@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from cosim.cli import application
 from cosim.data.recording import Recording
 from cosim.hardware.blackbox import read_black_box, recording_of
-from cosim.hardware.machine import Inject, Machine, read_machine
+from cosim.hardware.machine import Inject, Machine, changed, read_machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import FAULTS
 from cosim.master.simulate import run
@@ -60,6 +60,12 @@ def scenario(*changes: tuple[str, str]) -> Scenario:
 def machine(**inject: Any) -> Machine:
     faults = (Inject(**({"at": AT} | inject)),) if inject else ()
     return SIMULATED.model_copy(update={"inject": faults})
+
+
+def altered(given: Machine = SIMULATED, **changes: Any) -> Machine:
+    """A machine with other numbers, read anew: a section keeps those that are not given."""
+    kept = {name: getattr(given, name).model_dump() for name in ("limits", "reactions", "clock", "encoder")}
+    return changed(given, "test", **{name: kept[name] | one if name in kept else one for name, one in changes.items()})
 
 
 def session(folder: Path, given: Machine = SIMULATED, what: Scenario | None = None, **options: Any) -> Session:

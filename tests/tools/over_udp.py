@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from on_hardware import SIMULATED, scenario
+from on_hardware import SIMULATED, altered, scenario
 
 from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.session import Session
@@ -57,7 +57,7 @@ def impatient(one: Session, milliseconds: int = 10) -> Session:
 
 
 LATER = {"heartbeat_ms": 500.0, "late_in_a_row": 1000, "window_ms": 5.0}
-PATIENT = changed(read_machine("virtual"), "test", reactions=read_machine("virtual").reactions.model_dump() | LATER)
+PATIENT = altered(read_machine("virtual"), reactions=LATER)
 """A machine whose reactions wait for a computer that has more to do."""
 
 
