@@ -68,14 +68,11 @@ def _steps(path: Path, section: str) -> tuple[dict[str, np.ndarray], int]:
     kept = [row for row in rows if row[2] != "DROP" and len(row) >= len(names)]
     wanted = {"t": "Time"} | {name: name for name in (*ANGLES, *OTHERS) if name in names}
     try:
-        table = {ours: _column(kept, names.index(theirs)) for ours, theirs in wanted.items()}
+        places = {ours: names.index(theirs) for ours, theirs in wanted.items()}
+        table = {ours: np.array([float(row[place] or 0) for row in kept]) for ours, place in places.items()}
     except ValueError as error:
         raise RecordingError(f"{path}: {short(str(error))}, in the guide steps.", culprit=str(path)) from None
     return table, len(rows) - len(kept)
-
-
-def _column(rows: Sequence[Sequence[str]], place: int) -> np.ndarray:
-    return np.array([float(row[place] or 0) for row in rows])
 
 
 def _start(text: str) -> str:

@@ -56,7 +56,10 @@ def read(path: Path) -> Columns:
             if kind in definitions:
                 schema = records.Schema(id=number, name=kind, encoding="ros2msg", data=definitions[kind].encode())
                 decoders[key] = name, kind, decoder.decoder_for("cdr", schema)
-        _check(path, decoders, [kind for _, _, kind in topics])
+        if not decoders:
+            kinds = ", ".join(sorted({kind for _, _, kind in topics})[:5])
+            text = f"{path} defines none of its messages ({kinds}) and holds no JointState"
+            raise RecordingError(f"{text}; convert it with ros2 bag convert to MCAP, which does.", culprit=str(path))
         return columns_of(path, _messages(bag, decoders))
 
 
@@ -107,15 +110,6 @@ def _definitions(bag: sqlite3.Connection) -> dict[str, str]:
         rows = bag.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
         known |= {kind: text for kind, encoding, text in rows if encoding == "ros2msg" and text}
     return known
-
-
-def _check(path: Path, decoders: dict[int, Any], kinds: list[str]) -> None:
-    if not decoders:
-        text = (
-            f"{path} defines none of its messages ({', '.join(sorted(set(kinds))[:5])}) and holds no JointState; "
-            "convert it with ros2 bag convert to MCAP, which does."
-        )
-        raise RecordingError(text, culprit=str(path))
 
 
 def _messages(bag: sqlite3.Connection, decoders: dict[int, Any]) -> Iterator[Message]:

@@ -49,7 +49,7 @@ def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
     facts, keys, first = _head(lines, separator)
     names, times = _channels(path, keys)
     columns = _values(path, data, separator, first, len(names))
-    values, clocks = _channels_of(_groups(columns, names, times))
+    values, clocks = _channels_of(columns, names, times)
     units = {name: text for name, text in zip(names, _units(keys, names), strict=True) if text and name in values}
     return Columns(values, units, format="TwinCAT Scope", start=_start(facts), clocks=clocks)
 
@@ -101,32 +101,22 @@ def _channels(path: Path, keys: dict[str, list[str]]) -> tuple[list[str], list[i
     return names, times
 
 
-def _groups(
+def _channels_of(
     columns: Sequence[np.ndarray], names: Sequence[str], times: Sequence[int]
-) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
-    """Return the time of each group of channels in s, and its channels; a group may end before the others."""
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the channels and the times [s] of each; groups may end early, and share equal times."""
     clocks = [columns[start].astype(np.float64) for start in times]
     there = [~np.isnan(clock) for clock in clocks]
     first = min((float(clock[rows][0]) for clock, rows in zip(clocks, there, strict=True) if rows.any()), default=0.0)
-    is_ticks = first > TICKED
-    groups = []
-    for start, end, clock, rows in zip(times, [*times[1:], len(names)], clocks, there, strict=True):
-        seconds = (clock[rows] - first) * TICK if is_ticks else clock[rows] * 1e-3
-        groups.append((seconds, {names[place]: columns[place][rows] for place in range(start + 1, end)}))
-    return groups
-
-
-def _channels_of(
-    groups: Sequence[tuple[np.ndarray, dict[str, np.ndarray]]],
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the channels and the times of each; groups of equal times share them."""
     values: dict[str, np.ndarray] = {}
-    clocks: dict[str, np.ndarray] = {}
-    for seconds, channels in groups:
-        clock = next((one for one in clocks.values() if np.array_equal(one, seconds)), seconds)
+    owned: dict[str, np.ndarray] = {}
+    for start, end, clock, rows in zip(times, [*times[1:], len(names)], clocks, there, strict=True):
+        seconds = (clock[rows] - first) * TICK if first > TICKED else clock[rows] * 1e-3
+        seconds = next((one for one in owned.values() if np.array_equal(one, seconds)), seconds)
+        channels = {names[place]: columns[place][rows] for place in range(start + 1, end)}
         values |= channels
-        clocks |= dict.fromkeys(channels, clock)
-    return values, clocks
+        owned |= dict.fromkeys(channels, seconds)
+    return values, owned
 
 
 def _units(keys: dict[str, list[str]], names: Sequence[str]) -> list[str]:

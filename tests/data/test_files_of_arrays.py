@@ -76,6 +76,7 @@ SHAPES: dict[str, tuple[str, Any, dict[str, str], np.ndarray]] = {
         {"q": "joint.position.1"},
         Q,
     ),
+    "a serial number beyond 64 bits": ("run.json", COLUMNS | {"serial": [2**70] * 500}, {}, Q),
     "stated units": ("run.json", COLUMNS | {"units": {"q": "deg", "tau": "N.m"}}, {}, np.deg2rad(Q)),
     "what a record lacks is no value": (
         "run.json",

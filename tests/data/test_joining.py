@@ -113,6 +113,7 @@ def test_a_set_point_holds_a_temperature_is_read_on_a_line_and_what_costs_too_mu
     assert '"temperature" (5 Hz, ' in said
     assert "0.3 s apart" in said
     assert "run: channels that do not cover these rows were left out: fan." in found.notes
+    assert "run: channels without numbers of their own times were left out: word." in found.notes
 
 
 def test_channels_of_one_time_are_a_table_and_those_without_a_common_time_are_refused() -> None:

@@ -211,6 +211,8 @@ def test_times_may_be_in_a_file_of_their_own_or_dates_of_several_kinds(
     written(tmp_path / "a.csv", "t,q", TQ, q(TQ))
     written(tmp_path / "b.csv", "tau,load", tau(TQ), q(TQ))
     agrees(Recording.read(tmp_path / "a.csv+b.csv"))
+    written(tmp_path / "d.csv", "x1,q", 1e3 * TQ, q(TQ))
+    agrees(Recording.read(tmp_path / "d.csv+b.csv", {"t": "x1"}, {"t": "ms"}))
     written(tmp_path / "b.csv", "tau,load", tau(TA), q(TA))
     with pytest.raises(RecordingError, match=r"b.csv has no time \(2,000 rows\); name it with --columns t="):
         Recording.read(tmp_path / "a.csv+b.csv")

@@ -26,11 +26,13 @@ DEG = np.degrees(1)
 DAYS = [f"{45352.5 + t / 86400:.11f}" for t in T]
 SECONDS = [f"2024-03-01 12:00:{int(10 * t):02d}" for t in T]
 SHARE = {"units": {"tau": "0.04 N.m"}}
+KT = {"columns": {"tau": "i_q"}, "units": {"tau": "2 N.m"}}
 ASKED = [
     *(
         (f"t,{name},position", (T, TAU, Q), rf'is in {stated} of a torque .*"tau=0.04 N.m"', SHARE, (T, 0.04 * TAU))
         for name, stated in (("torque [%]", "%"), ("torque_permille", "0.1 %"), ("torque (‰)", "0.1 %"))
     ),
+    ("t,i_q,i_d,pos", (T, TAU, TAU, Q), 'no torque but a current, "i_q"', KT, (T, 2 * TAU)),
     ("time,torque,pos", (DAYS, TAU, Q), r"200 Hz in days\. .* --units t=day, or", {"units": {"t": "day"}}, (T, TAU)),
     ("time,torque,pos", (SECONDS, TAU, Q), "period=50ms", {"layout": {"period": "50ms"}}, (10 * T, TAU)),
     ("", ([""] * ROWS, T, TAU, Q), r"t=#2 tau=#3 q=#4\.", {"columns": {"t": "#2", "tau": "#3", "q": "#4"}}, (T, TAU)),
@@ -45,6 +47,7 @@ def test_what_a_file_leaves_open_is_asked_and_the_answer_counts(
     path = written(tmp_path / "run.csv", header, *columns)
     with pytest.raises(UndecidedError, match=sentence):
         Recording.read(path)
+    assert re.search(sentence, preview(path).undecided[0]), "it is shown with the example that the question gives"
     read = Recording.read(path, **answer)
     np.testing.assert_allclose([read.t - read.t[0], read["tau"]], expected, atol=2e-6)
     np.testing.assert_allclose(read["q"], Q, atol=1e-8)
@@ -282,6 +285,8 @@ def test_a_speed_tells_milliseconds_and_radians_and_an_acceleration_that_agrees_
     assert not any(ASSUMED in note for note in seen.notes)
     for other in (A, np.sin(11 * TS), np.roll(A, 200)):  # its own, or that of another axis
         assert "acc_rad_s2" in read(tmp_path, "time_s,torque_Nm,position_rad,acc_rad_s2", TS, TAUS, QS, other)
+    said = read(tmp_path, "time_s,torque_Nm,position_rad,acc_rad_s2", 1e3 * TS, TAUS, QS, A, units={"t": "s"})
+    assert said.sample_time == pytest.approx(2), "what is said is not asked for"
 
 
 MS_OR_S = "--units t=ms or --units t=s"
