@@ -18,6 +18,7 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from friction_laws import EXAMPLES as LAWS
 from lxml import etree
+from scipy import constants
 
 from pyfmi_models.card import read_card
 from pyfmi_models.errors import ExportError
@@ -172,6 +173,9 @@ UNITS = {
     "1/degC": ({"K": -1}, 1.0),
     "s-1": ({"s": -1}, 1.0),
     "deg": ({"rad": 1}, np.pi / 180),
+    "arcmin": ({"rad": 1}, constants.arcmin),
+    "arcsec": ({"rad": 1}, constants.arcsec),
+    "h": ({"s": 1}, constants.hour),
     "degC": ({"K": 1}, 1.0),
     "mm/s": ({"m": 1, "s": -1}, 1e-3),
     "V": ({"kg": 1, "m": 2, "s": -3, "A": -1}, 1.0),

@@ -189,9 +189,18 @@ SHARE, DAMPING = 0.65, 0.03
 """Share of the inertia on the load, and d / k = 2 `DAMPING` / (2 pi fr)."""
 
 
+SPRINGS = LoadSideCompliance(resonance_hz=25.0, encoder_share=0.6), Compliance(antiresonance_hz=50, resonance_hz=60)
+
+
+@pytest.mark.parametrize("other", SPRINGS, ids=["behind the axis", "before it"])
+@pytest.mark.parametrize("spring", SPRINGS, ids=["behind the axis", "before it"])
+def test_a_mount_with_a_spring_is_asked_for_no_other(spring: Effect, other: Effect) -> None:
+    assert hypothesis_of(other).may_come(mount())
+    assert not hypothesis_of(other).may_come(mount(spring))
+
+
 def test_springs_before_and_behind_the_axis_are_a_chain_in_whatever_order_they_are_written() -> None:
-    springs = LoadSideCompliance(resonance_hz=25.0, encoder_share=0.6), Compliance(antiresonance_hz=50, resonance_hz=60)
-    first, second = (linear(mount(*some, friction=Frictionless()).model())[0] for some in (springs, springs[::-1]))
+    first, second = (linear(mount(*some, friction=Frictionless()).model())[0] for some in (SPRINGS, SPRINGS[::-1]))
     np.testing.assert_allclose(*(np.sort_complex(np.linalg.eigvals(one)) for one in (first, second)), atol=1e-6)
 
 
