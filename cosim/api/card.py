@@ -67,11 +67,13 @@ class CardResult:
 
     def text(self) -> str:
         """Return the card as TOML, with the ranges as a comment."""
-        return card_text(self.card, "\n".join(["Estimated from recordings alone; 95 % ranges:", *_rows(self.found)]))
+        return card_text(
+            self.card, "\n".join(["Estimated from recordings alone; 95 % ranges:", *map(_row, self.numbers)])
+        )
 
     def __str__(self) -> str:
         share = f"{100 * self.found.explained:.0f} % of the torque's energy explained."
-        return "\n".join([*_rows(self.found), share, *self.notes])
+        return "\n".join([*map(_row, self.numbers), share, *self.notes])
 
     def __repr__(self) -> str:
         return f"CardResult({self.card.mount.name!r}, {len(self.numbers)} numbers)"
@@ -176,10 +178,6 @@ def _card(found: FirstCard, recordings: Sequence[Recording]) -> Card:
         effects=tuple(one for one in mount.effects if one not in loads),
         origin=origin,
     )
-
-
-def _rows(found: FirstCard) -> list[str]:
-    return [_row(one) for one in found.numbers]
 
 
 def _row(one: Number) -> str:

@@ -11,6 +11,7 @@ from cosim.experiments.check import check as carry_out
 from cosim.experiments.comparison import RTOL
 from cosim.fmi.description import INTERFACES
 from cosim.support.errors import InputError
+from cosim.support.files import check_free
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
 
@@ -89,6 +90,6 @@ def check(
         raise InputError(text, culprit="--interface", value=interface, choices=choices)
     folder = None if out is None else Path(out)
     if folder:
-        deliver.check_out(folder, force)
+        check_free(folder / deliver.JSON, force)
     done = carry_out(Path(fmu), rtol, timeout, interface, on_progress)
     return CheckResult(done, deliver.deliver(done, folder, force) if folder else {})

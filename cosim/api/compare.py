@@ -49,13 +49,7 @@ class Comparison:
 
     def as_json(self) -> JsonObject:
         """Return everything but the columns as plain data; what is no number is null."""
-        rows = [
-            {
-                key: value if not isinstance(value, float) or isfinite(value) else None
-                for key, value in asdict(one).items()
-            }
-            for one in self.differences
-        ]
+        rows = [{key: _finite(value) for key, value in asdict(one).items()} for one in self.differences]
         t = self.overlay.t
         return {
             "recordings": list(self.overlay.names),

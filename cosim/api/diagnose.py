@@ -5,18 +5,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from cosim.api.defaults import estimated, split
 from cosim.api.progress import Staged, stages_of
 from cosim.api.recordings import Source, Written, at_least_one, read_all
-from cosim.api.tables import findings_frame, missing_frame
 from cosim.api.why import frame
 from cosim.data.recording import Recording
 from cosim.delivery.deliver import DOCUMENT, FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
 from cosim.delivery.proposal import Proposal, write_proposals
 from cosim.diagnosis.answer.entries import Improved
-from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.search.side_by_side import side_by_side
@@ -68,7 +67,11 @@ class DiagnosisResult:
 
     def frame(self) -> "pd.DataFrame":
         """Return the findings as a table, a row an effect, with answer, probability, size and its range."""
-        return findings_frame(self.findings)
+        import pandas as pd
+
+        names = ("effect", "title", "answer", "probability", "size", "size_range", "action")
+        rows = [[getattr(one, name) for name in names] for one in self.findings]
+        return pd.DataFrame(rows, columns=names).rename(columns={"size_range": "range"})
 
     @property
     def missing_torque(self) -> "pd.DataFrame":
@@ -112,6 +115,23 @@ class DiagnosisResult:
             if one.answer in ("found", "ambiguous", "not_proven")
         ]
         return html_table("Missing physics", rows) + html_text(str(self))
+
+
+def missing_frame(traces: Sequence[Trace]) -> "pd.DataFrame":
+    """Return the missing torque of all recordings, a row a sample that was judged."""
+    import pandas as pd
+
+    signals = ("t", "q", "v", "missing", "band")
+    parts = [
+        pd.DataFrame(
+            {"recording": one.name, "heldout": one.heldout}
+            | {name: getattr(one, name) for name in signals}
+            | {"after": one.tau - one.after}
+        )
+        for one in traces
+    ]
+    columns = ["recording", "heldout", *signals, "after"]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
 
 @shows_progress()
@@ -170,12 +190,12 @@ def diagnose(
     folder = _checked(out, quick, force)
     on_progress = Staged(on_progress, stages_of(card is not None, folder is not None and not quick))
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
-    given = replace(given, with_possible=with_possible)
+    given = replace(given, with_possible=with_possible, command=command, on_answer=on_answer)
     if fmu is not None:
         given = _with_base(Path(fmu), variables or {}, given, on_progress)
     way = _delivered if folder and not quick else _diagnosed
     with _anew(folder if force else None):
-        return way(given, folder, command, _Listeners(on_progress, on_answer))
+        return way(given, folder, on_progress)
 
 
 def _checked(out: str | Path | None, quick: bool, force: bool) -> Path | None:
@@ -220,13 +240,8 @@ class _Given:
     notes: tuple[str, ...] = ()
     """What was chosen where less was given."""
     with_possible: bool = False
-
-
-class _Listeners(NamedTuple):
-    """Whom to tell what is being done, and the answer."""
-
-    on_progress: Callable[[str], None]
-    on_answer: Callable[[Diagnosis], None]
+    command: str = ""
+    on_answer: Callable[[Diagnosis], None] = lambda found: None
 
 
 def _read(
@@ -261,48 +276,40 @@ def _with_base(fmu: Path, variables: Mapping[str, str], given: _Given, on_progre
     box = BlackBox(fmu, {name: Alias(own) for name, own in variables.items()})
     base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
-    return replace(
-        given,
-        train=base.train,
-        heldout=base.heldout,
-        card=base.card,
-        more=correction.deliver,
-        base=box.label,
-    )
+    given = replace(given, train=base.train, heldout=base.heldout, card=base.card)
+    return replace(given, more=correction.deliver, base=box.label)
 
 
-def _diagnosed(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
+def _diagnosed(given: _Given, out: Path | None, on_progress: Callable[[str], None]) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
-    found = find(given.train, given.heldout, given.card, listeners.on_progress, with_possible=given.with_possible)
-    outcome = _noted(found, given)
-    listeners.on_answer(outcome.diagnosis)
+    found = find(given.train, given.heldout, given.card, on_progress, with_possible=given.with_possible)
+    outcome = _answered(found, given)
     done = without_files(outcome.diagnosis)
     if out:
-        done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
+        done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, given.command, given.base)
     return _result(done, outcome, given)
 
 
-def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
+def _delivered(given: _Given, out: Path | None, on_progress: Callable[[str], None]) -> DiagnosisResult:
     """Diagnose with the loops closed beside it, and write all files."""
     from cosim.delivery.closed_loop import Loops  # the master: a third of all that is imported
 
     assert out is not None  # files need a folder
     train, heldout, card = given.train, given.heldout, given.card
-    with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:
+    with Loops(card, heldout) as loops, side_by_side(on_progress) as refits:
         loops.close("nominal", card.plant())
-        found = find(train, heldout, card, listeners.on_progress, loops.close, refits, given.with_possible)
-        outcome = _noted(found, given)
-        listeners.on_answer(outcome.diagnosis)
-        done = deliver(
-            outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
-        )
+        found = find(train, heldout, card, on_progress, loops.close, refits, given.with_possible)
+        outcome = _answered(found, given)
+        done = deliver(outcome, train, heldout, card, out, given.command, loops, on_progress, given.more, given.base)
     return _result(done, outcome, given)
 
 
-def _noted(outcome: Outcome, given: _Given) -> Outcome:
-    """Add what was said while reading, and what to do on the kind of machine that the card names."""
+def _answered(outcome: Outcome, given: _Given) -> Outcome:
+    """Add what was said while reading, and what to do on the kind of machine that the card names; tell the answer."""
     found = for_machine(outcome.diagnosis, given.card.mount.machine or "")
-    return replace(outcome, diagnosis=replace(found, data_quality=(*given.notes, *found.data_quality)))
+    found = replace(found, data_quality=(*given.notes, *found.data_quality))
+    given.on_answer(found)
+    return replace(outcome, diagnosis=found)
 
 
 def _result(done: Diagnosis, outcome: Outcome, given: _Given) -> DiagnosisResult:

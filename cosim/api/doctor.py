@@ -1,20 +1,18 @@
 """`cosim doctor`: what is installed, what works here, and what the caches hold."""
 
 import platform
-import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from cosim.support.errors import CosimError
+from cosim.support.extras import DISTRIBUTION, declared
 from cosim.support.files import cache_home, in_bytes
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 
-PACKAGE = "mount-cosim"
-REQUIREMENT = re.compile(r"^([\w.-]+(?:\[[\w,]+\])?)[^;]*(?:;\s*extra\s*==\s*['\"](\w+)['\"])?")
 FOR_USERS = {
     "mdf": "MDF4 recordings",
     "hdf5": "HDF5 and MAT 7.3 recordings",
@@ -43,13 +41,8 @@ class Health:
 
     def as_json(self) -> JsonObject:
         """Return everything as plain data."""
-        return {
-            "versions": dict(self.versions),
-            "works": dict(self.works),
-            "extras": dict(self.extras),
-            "caches": dict(self.caches),
-            "cache_folder": str(self.folder),
-        }
+        tables = ("versions", "works", "extras", "caches")
+        return {name: dict(getattr(self, name)) for name in tables} | {"cache_folder": str(self.folder)}
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -74,17 +67,10 @@ def _table(title: str, rows: Mapping[str, str]) -> Iterator[str]:
     yield from (f"  {name:<{width}}  {value}".rstrip() for name, value in rows.items())
 
 
-def _requirements() -> Iterator[tuple[str, str]]:
-    """Packages and the extra each belongs to, "" for those that are always needed."""
-    for text in requires(PACKAGE) or ():
-        if found := REQUIREMENT.match(text):
-            yield found[1], found[2] or ""
-
-
 def _versions() -> dict[str, str]:
-    own = {PACKAGE: __version__, "Python": f"{platform.python_version()} ({sys.executable})"}
+    own = {DISTRIBUTION: __version__, "Python": f"{platform.python_version()} ({sys.executable})"}
     own["computer"] = f"{platform.system()} {platform.release()}, {platform.machine()}"
-    needed = sorted({name for name, extra in _requirements() if not extra})
+    needed = sorted({name for name, _, extra in declared() if not extra})
     return own | {name: _version_of(name) or "missing: reinstall the package" for name in needed}
 
 
@@ -120,7 +106,7 @@ def _has_hardware() -> bool:
 
 def _extras() -> dict[str, str]:
     wanted: dict[str, list[str]] = {}
-    for name, extra in _requirements():
+    for name, _, extra in declared():
         wanted.setdefault(extra, []).append(name)
     found = {}
     for extra, words in FOR_USERS.items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -286,25 +287,15 @@ def _system_writer(card: Card, fmi: Fmi, platforms: tuple[str, ...]) -> Writer:
     return lambda path, force: export_ssp(system, path, fmi=fmi, force=force, platforms=platforms)
 
 
-def _modelica_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
-    """Return the path of the Modelica package of a card's plant and what writes it."""
-    from pyfmi_models.derivation import derivation_of
-    from pyfmi_models.export.modelica import export_modelica, package_name
-
-    plant = card.plant()
-    path = out / f"{package_name(stem)}.mo"
-    return path, lambda path, force: export_modelica(plant.model(), path, derivation_of(plant), force=force)
-
-
-def _flange_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
-    """The same of the package with flanges."""
+def _modelica_writer(card: Card, out: Path, stem: str, flange: bool = False) -> tuple[Path, Writer]:
+    """Return the path of the Modelica package of a card's plant, with flanges or without, and what writes it."""
     from pyfmi_models.derivation import derivation_of
     from pyfmi_models.export.flange import export_flange
-    from pyfmi_models.export.modelica import package_name
+    from pyfmi_models.export.modelica import export_modelica, package_name
 
-    plant = card.plant()
-    path = out / f"{package_name(stem)}Flange.mo"
-    return path, lambda path, force: export_flange(plant.model(), path, derivation_of(plant), force=force)
+    plant, write = card.plant(), export_flange if flange else export_modelica
+    path = out / f"{package_name(stem)}{'Flange' * flange}.mo"
+    return path, lambda path, force: write(plant.model(), path, derivation_of(plant), force=force)
 
 
 def _c_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
@@ -317,6 +308,6 @@ def _c_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
 
 _OTHERS: dict[str, Callable[[Card, Path, str], tuple[Path, Writer]]] = {
     "modelica": _modelica_writer,
-    "modelica_flange": _flange_writer,
+    "modelica_flange": partial(_modelica_writer, flange=True),
     "c": _c_writer,
 }

@@ -183,27 +183,17 @@ def identify(
         OutputError: a file is there already; nothing was fitted then.
     """
     check_one(card, model.get("fmu"), model.get("system"))
+    if strange := set(model) - set(ForModels.__annotations__):
+        raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
     folder = None if out is None else Path(out)
     if card is not None:
-        _check_none(model)
+        if more := sorted(name for name, value in model.items() if value is not None):
+            raise InputError(f"{', '.join(more)}: of an FMU or a system, not of a card; leave it out.", culprit=more[0])
         given = Options(tuple(free), cut, keep_inertia, starts, seed)
         return _of_card(recordings, card, folder, given, columns, units, force, on_progress)
-    _check_names(model)
     find_of_model: Callable[..., CalibrateResult] = loaded(IDENTIFIERS, "model")
     how = {"free": tuple(free), "columns": columns or {}, "starts": starts, "seed": seed}
     return find_of_model(recordings, model, how, folder, units=units, force=force, on_progress=on_progress)
-
-
-def _check_none(model: ForModels) -> None:
-    """Refuse, where a card is fitted, what goes with an FMU or a system (InputError)."""
-    _check_names(model)
-    if given := sorted(name for name, value in model.items() if value is not None):
-        raise InputError(f"{', '.join(given)}: of an FMU or a system, not of a card; leave it out.", culprit=given[0])
-
-
-def _check_names(model: ForModels) -> None:
-    if strange := set(model) - set(ForModels.__annotations__):
-        raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
 
 
 def check_one(*models: object) -> None:

@@ -1,6 +1,6 @@
 """Where a system is proven: the ranges of its components, brought to the signals that feed them and intersected."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cosim.fmi.component import Port
@@ -35,8 +35,11 @@ def proven_rows(scenario: Scenario) -> list[Row]:
     """
     found: dict[str, list[Range]] = {}
     for name, component in scenario.components.items():
-        for one in _ranges(scenario, name, component):
-            found.setdefault(one.signal, []).append(one)
+        ours = {alias.name: key for key, alias in component.aliases.items()}
+        for one in _domains(component):
+            variable = ours.get(one.variable or one.name, one.variable or one.name)
+            proven = _at_source(scenario, f"{name}.{variable}", name, one)
+            found.setdefault(proven.signal, []).append(proven)
     return [_row(signal, ranges) for signal, ranges in found.items()]
 
 
@@ -49,26 +52,14 @@ def _row(signal: str, ranges: list[Range]) -> Row:
     return {"signal": signal, "proven": said, "for": ", ".join(dict.fromkeys(one.component for one in ranges))}
 
 
-def _ranges(scenario: Scenario, name: str, component: ComponentSection) -> Iterator[Range]:
-    ours = {alias.name: key for key, alias in component.aliases.items()}
-    for one in _domains(component):
-        variable = ours.get(one.variable or one.name, one.variable or one.name)
-        yield _at_source(scenario, f"{name}.{variable}", name, one)
-
-
 def _domains(component: ComponentSection) -> tuple[Domain, ...]:
     if component.fmu is not None:
         return domains_at(component.fmu)
-    if component.card is not None and component.part == "plant":
-        return card_domains(component.card)
-    return ()
-
-
-def card_domains(card: str) -> tuple[Domain, ...]:
-    """Where a card says that it is proven: `[origin] operational_domain`."""
+    if component.card is None or component.part != "plant":
+        return ()
     from pyfmi_models.card import read_card
 
-    return domains_of(read_card(card).origin.get(KEY))
+    return domains_of(read_card(component.card).origin.get(KEY))
 
 
 def _ports(component: ComponentSection) -> Mapping[str, Port]:

@@ -87,14 +87,13 @@ class Delivery:
 
     def of(self, scenario: Scenario) -> RunResult:
         """Run a scenario whose FMUs are there; its process inherits the lock of the folder."""
-        with claimed(self.folder, "run") as lock:
-            return self._written(scenario, self._carried_out(scenario, lock))
-
-    def _carried_out(self, scenario: Scenario, lock: int) -> RunResult:
         options = replace(self.options, path=self.folder / RECORDING)
-        if self.isolate:
-            return run_isolated(scenario, options, call_timeout=self.call_timeout, keep=(lock,))
-        return run_here(scenario, options)
+        with claimed(self.folder, "run") as lock:
+            if self.isolate:
+                done = run_isolated(scenario, options, call_timeout=self.call_timeout, keep=(lock,))
+            else:
+                done = run_here(scenario, options)
+            return self._written(scenario, done)
 
     def _written(self, scenario: Scenario, done: RunResult) -> RunResult:
         """Write the page and the statistics beside the recording."""

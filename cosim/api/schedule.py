@@ -1,7 +1,6 @@
 """`cosim show SCENARIO --schedule`: what happens in a step and in which order, before anything runs."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from cosim.support.plain import Json
 from cosim.system.algorithm import Algorithm, Energy, Iterated, Stage
@@ -93,10 +92,6 @@ def _offered(scenario: Scenario) -> Iterator[Row]:
         from cosim.fmi.description import describe
 
         said = describe(component.fmu)
-        unused = [words for key, words in _UNUSED.items() if _has(said.coSimulation, key)]
+        unused = [words for key, words in _UNUSED.items() if getattr(said.coSimulation, key, False)]
         told = ", ".join(unused) or "nothing"
         yield {"component": name, "FMU": origin(component), "FMI": said.fmiVersion, "offered, not used": told}
-
-
-def _has(interface: Any, key: str) -> bool:
-    return bool(getattr(interface, key, False))

@@ -16,7 +16,6 @@ from cosim.system.variant import ssp_of
 
 if TYPE_CHECKING:
     from cosim.data.recording import Recording
-    from pyfmi_models.card import Card
 
 Facts = Mapping[str, Json]
 Row = Mapping[str, Json]
@@ -80,46 +79,32 @@ def show(
     Raises:
         InputError: the file is unsupported, or breaks its own rules.
     """
-    if schedule:
-        _check_of_recordings(source, columns, units, layout, picture)
-        return _of_schedule(source)
-    if not isinstance(source, str | Path):
-        from cosim.api.show_recordings import of_recording
+    path = Path(source) if isinstance(source, str | Path) else None
+    own = result(path) if path and not schedule else None
+    if not schedule and own is None and (path is None or _may_be_recording(path)):
+        from cosim.api.show_recordings import of_file, of_recording
 
-        return Shown(*of_recording(source, picture, force))
-    if (own := result(Path(source))) is not None:
-        _check_of_recordings(source, columns, units, layout, picture)
-        return Shown(*own)
-    if Path(source).suffix in NO_RECORDINGS or ssp_of(source)[0] is not None:
-        _check_of_recordings(source, columns, units, layout, picture)
-        facts, tables = describe(str(source))
-        return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
-    from cosim.api.show_recordings import of_file
-
-    options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
-    return Shown(*of_file(Path(source), options, picture, force))
-
-
-def _check_of_recordings(
-    source: object,
-    columns: Mapping[str, str] | None,
-    units: Mapping[str, str] | None,
-    layout: Mapping[str, str] | None,
-    picture: str | Path | None,
-) -> None:
-    """Refuse options of recordings with what is none (InputError): they would do nothing."""
-    given = {"--columns": columns, "--units": units, "--layout": layout, "--out": picture}
-    for name, value in given.items():
+        options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
+        if not isinstance(source, str | Path):
+            return Shown(*of_recording(source, picture, force))
+        return Shown(*of_file(Path(source), options, picture, force))
+    for name, value in {"--columns": columns, "--units": units, "--layout": layout, "--out": picture}.items():
         if value:
             raise InputError(f"{name} is for recordings alone; {source} is shown without it.", culprit=name)
-
-
-def _of_schedule(source: "str | Path | Recording") -> Shown:
-    from cosim.api.schedule import schedule
-
-    if not isinstance(source, str | Path):
+    if own is not None:
+        return Shown(*own)
+    if path is None:
         raise InputError("A recording has no schedule: give a scenario (.toml) or an SSP.")
-    return Shown(*schedule(str(source)))
+    if schedule:
+        from cosim.api.schedule import schedule as schedule_of
+
+        return Shown(*schedule_of(str(source)))
+    facts, tables = describe(str(source))
+    return Shown(facts, tables, drawing(str(source)) if WIRES in tables else ())
+
+
+def _may_be_recording(path: Path) -> bool:
+    return path.suffix not in NO_RECORDINGS and ssp_of(path)[0] is None
 
 
 def _lines(rows: Sequence[Row]) -> list[str]:
@@ -130,12 +115,12 @@ def _lines(rows: Sequence[Row]) -> list[str]:
     return ["  " + "  ".join(row).rstrip() for row in padded]
 
 
-def drawing(file: str) -> list[str]:
+def drawing(file: str) -> tuple[str, ...]:
     """Return the wiring of a scenario as lines of text, with the delay of each wire."""
     from cosim.system.diagram import draw
     from cosim.system.scenario import read_scenario
 
-    return draw(read_scenario(file))
+    return tuple(draw(read_scenario(file)))
 
 
 def describe(file: str) -> tuple[Facts, Tables]:
@@ -312,6 +297,7 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
 
 def _card(file: str) -> tuple[Facts, Tables]:
     from cosim.fmi.domain import KEY, domains_of
+    from cosim.models.maps import curves, maps_of
     from pyfmi_models.card import read_card
 
     card = read_card(file)
@@ -331,12 +317,5 @@ def _card(file: str) -> tuple[Facts, Tables]:
         {"parameter": v.name, "value": f"{v.start:.6g}", "unit": v.unit, "description": v.description}
         for v in model.parameters
     ]
-    drawn = _maps(card) if card.effects else []
+    drawn = curves(maps_of(card)) if card.effects else []
     return facts, {"parameters": parameters} | ({"learned maps": drawn} if drawn else {})
-
-
-def _maps(card: "Card") -> list[dict[str, Json]]:
-    """Return the learned terms of a card as curves of text."""
-    from cosim.models.maps import curves, maps_of
-
-    return curves(maps_of(card))

@@ -33,7 +33,11 @@ def of_effect(name: str) -> Shown:
         "how to distinguish": form.told_apart_by,
         "to record": form.to_record,
     }
-    tables: dict[str, Sequence[Mapping[str, Json]]] = {"parameters": _parameters(forms)}
+    declared = {  # of an effect that has several forms, the numbers of all
+        one.name: one.metadata["variable"] for form in forms for one in fields(form) if "variable" in one.metadata
+    }
+    rows = [{"parameter": key, "unit": v.unit, "description": v.description} for key, v in declared.items()]
+    tables: dict[str, Sequence[Mapping[str, Json]]] = {"parameters": rows}
     if known := repairs_of(name):
         tables["checks"] = [
             {"check": f"{number}. {check.do}" if first else "", "result": seen, "means": means}
@@ -42,14 +46,6 @@ def of_effect(name: str) -> Shown:
         ]
         tables["repair"] = [{"machine": MACHINES[kind], "repair": text} for kind, text in known.by_machine.items()]
     return {name: value for name, value in facts.items() if value}, tables
-
-
-def _parameters(forms: "Sequence[type[Effect]]") -> list[dict[str, Json]]:
-    """Return the numbers of an effect in a card; of one that has several forms all of them."""
-    declared = {
-        one.name: one.metadata["variable"] for form in forms for one in fields(form) if "variable" in one.metadata
-    }
-    return [{"parameter": key, "unit": v.unit, "description": v.description} for key, v in declared.items()]
 
 
 def _catalogue() -> "Mapping[str, Sequence[type[Effect]]]":

@@ -30,12 +30,8 @@ def _of_many(path: Path, runs: Sequence[Run]) -> Shown:
         {"number": f"#{number}", "recording": one.which, "rows": one.rows, "duration": f"{one.seconds:.6g} s"}
         for number, one in enumerate(runs, 1)
     ]
-    facts: dict[str, Json] = {
-        "recording": str(path),
-        "holds": f"{len(runs):,} recordings",
-        "take one": taken(path, runs),
-    }
-    return facts, {"recordings": rows}
+    holds = f"{len(runs):,} recordings"
+    return {"recording": str(path), "holds": holds, "take one": taken(path, runs)}, {"recordings": rows}
 
 
 def of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Shown:

@@ -36,8 +36,5 @@ def card(
         done = estimate(read, motion=motion, inertia=inertia, on_progress=progress.log)
     directory(file.parent)
     done.write(file, force)
-    if as_json:
-        put_json(done.as_json())
-    else:
-        put(str(done))
+    put_json(done.as_json()) if as_json else put(str(done))
     say(f"Wrote {file}; a diagnosis takes it with --card {file}")

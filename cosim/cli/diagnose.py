@@ -3,8 +3,9 @@
 import json
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 Propose = Annotated[
     Path | None, typer.Option("--propose", help="Folder for formulas outside the catalogue, as effects to review.")
 ]
+SHARED = ("motion", "columns", "units", "layout", "fmu", "variables", "quick", "with_possible")
+"""Options of one machine and of several, in the order in which the command is told again."""
+TOGETHER = ("motion", "fmu", "quick", "with_possible", "card", "workers", "cluster", "force")
 
 
 def diagnose(
@@ -65,15 +69,12 @@ def diagnose(
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
-    shared: dict[str, object] = {"--motion": motion, "--columns": columns, "--units": units, "--layout": layout}
-    shared |= {"--fmu": fmu, "--variables": variables, "--quick": quick, "--with-possible": with_possible}
+    given = dict(locals())
     if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
-        out = out or _begun(train[0].resolve().stem)
-        return _all(machines, Together(out, card, workers, cluster, force, as_json, check), shared, variables)
+        return _all(machines, out or _begun(train[0].resolve().stem), given)
     _check_single(workers, cluster)
     out = out or default_out(Path(train[0]).resolve().stem)
-    one = One(train, heldout or [], card, out, propose, force, shared)
-    found = _diagnosed(one, variables)
+    found = _diagnosed(out, given)
     for note in found.notes:
         say(note)
     from cosim.report.terminal import proposed, summary
@@ -85,54 +86,25 @@ def diagnose(
         sys.exit(1)
 
 
-class One(NamedTuple):
-    """What is diagnosed of one machine; `options` by the words of the command line."""
-
-    train: list[Path]
-    heldout: list[Path]
-    card: str
-    out: Path
-    propose: Path | None
-    force: bool
-    options: dict[str, object]
-
-
-def _diagnosed(one: One, variables: list[str] | None) -> "DiagnosisResult":
-    """Read, diagnose and write, and show how it goes."""
+def _diagnosed(out: Path, given: Mapping[str, Any]) -> "DiagnosisResult":
+    """Read, diagnose and write, and show how it goes; `given` are the options by name."""
     from cosim.api.diagnose import diagnose as find
     from cosim.reading import pairs_of
 
     keep_freed_memory()
-    quick, motion = bool(one.options["--quick"]), str(one.options["--motion"])
-    _check_folders(one.out, one.propose, quick, one.force)
-    how: Any = tuple(one.options[name] for name in ("--columns", "--units", "--layout"))
-    believed, recordings = _read(one.train, one.heldout, one.card, motion, how)
-    given = {"--heldout": one.heldout, "--card": one.card, "--out": one.out, "--propose": one.propose, **one.options}
-    fmu: Any = one.options["--fmu"]
+    train, heldout, force = given["train"], given["heldout"] or [], given["force"]
+    _check_folders(out, given["propose"], given["quick"], force)
+    believed, recordings = _read(train, heldout, given)
+    options = {"--heldout": heldout, "--card": given["card"], "--out": out, "--propose": given["propose"]}
+    options |= {f"--{name.replace('_', '-')}": given[name] for name in SHARED}
     with stage("looking for what the model lacks") as progress:
         return find(
-            *(recordings[: len(one.train)], recordings[len(one.train) :], believed, one.out),
-            motion=motion,
-            fmu=fmu,
-            variables=pairs_of("--variables", variables),
-            quick=quick,
-            with_possible=bool(one.options["--with-possible"]),
-            force=one.force,
-            command=command_of("diagnose", one.train, given),
+            *(recordings[: len(train)], recordings[len(train) :], believed, out),
+            **{name: given[name] for name in ("motion", "fmu", "quick", "with_possible", "force")},
+            variables=pairs_of("--variables", given["variables"]),
+            command=command_of("diagnose", train, options),
             on_progress=progress.tell,
         )
-
-
-class Together(NamedTuple):
-    """How the machines of a folder are diagnosed."""
-
-    out: Path
-    card: str
-    workers: int | None
-    cluster: str
-    force: bool
-    as_json: bool
-    check: bool
 
 
 def _machines(folder: Path, heldout: list[Path] | None, propose: Path | None) -> "list[Machine]":
@@ -170,7 +142,7 @@ def _check_single(workers: int | None, cluster: str) -> None:
             raise InputError(text, culprit=option)
 
 
-def _all(machines: "list[Machine]", how: Together, options: dict[str, object], variables: list[str] | None) -> None:
+def _all(machines: "list[Machine]", out: Path, given: Mapping[str, Any]) -> None:
     """Diagnose machine by machine; print a line of each as it comes."""
     from cosim.api.folder import diagnose_folder
     from cosim.api.machines import MachineResult
@@ -181,31 +153,21 @@ def _all(machines: "list[Machine]", how: Together, options: dict[str, object], v
 
     def on_machine(one: MachineResult, done: int, of: int) -> None:
         nonlocal fresh
-        put(json.dumps(one.as_json())) if how.as_json else put(str(one))
+        put(json.dumps(one.as_json())) if given["as_json"] else put(str(one))
         sys.stdout.flush()
         fresh += not one.earlier
         if done < of and fresh:
             say(f"{done} of {of} machines, about {(of - done) * (time.monotonic() - began) / fresh:.0f} s left")
 
-    named: Any = {name: options[f"--{name}"] or () for name in ("columns", "units", "layout")}
-    rest: Any = {name: options[f"--{name.replace('_', '-')}"] for name in ("motion", "fmu", "quick", "with_possible")}
+    how: dict[str, Any] = {name: given[name] or () for name in ("columns", "units", "layout")}
+    how |= {name: given[name] for name in TOGETHER}
+    variables = pairs_of("--variables", given["variables"])
     try:
-        done = diagnose_folder(
-            machines,
-            how.out,
-            card=how.card,
-            variables=pairs_of("--variables", variables),
-            workers=how.workers,
-            cluster=how.cluster,
-            force=how.force,
-            on_machine=on_machine,
-            **named,
-            **rest,
-        )
+        done = diagnose_folder(machines, out, variables=variables, on_machine=on_machine, **how)
     except KeyboardInterrupt:
-        say(f"what was done until then is in {how.out}; the same command goes on from there")
+        say(f"what was done until then is in {out}; the same command goes on from there")
         raise
-    _end(done, how.check)
+    _end(done, given["check"])
 
 
 def _end(done: "FolderResult", check: bool) -> None:
@@ -218,17 +180,14 @@ def _end(done: "FolderResult", check: bool) -> None:
         sys.exit(1)
 
 
-def _read(
-    train: list[Path], heldout: list[Path], card: str, motion: str, options: tuple[list[str] | None, ...]
-) -> "tuple[Card | None, list[Recording]]":
+def _read(train: list[Path], heldout: list[Path], given: Mapping[str, Any]) -> "tuple[Card | None, list[Recording]]":
     """Read the card, if one is given, and all recordings."""
     from cosim.reading import read_recordings
     from pyfmi_models.card import read_card
 
-    believed = read_card(card) if card else None
-    names, kind = (believed.columns, believed.mount.motion) if believed else ({}, motion)
-    columns, units, layout = options
-    recordings = read_recordings((*train, *heldout), names, columns, units, kind, layout)
+    believed = read_card(given["card"]) if given["card"] else None
+    names, kind = (believed.columns, believed.mount.motion) if believed else ({}, given["motion"])
+    recordings = read_recordings((*train, *heldout), names, given["columns"], given["units"], kind, given["layout"])
     seconds, several = sum(recording.duration for recording in recordings), "s" * (len(recordings) > 1)
     named = f"card {believed.mount.name}" if believed else "no card"
     say(f"Read {len(recordings)} recording{several}, {seconds:.0f} s; {named}")

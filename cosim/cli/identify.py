@@ -1,6 +1,6 @@
 """`cosim identify`: recordings and a card, an FMU or a system to the same with identified numbers."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from inspect import signature
 from pathlib import Path
@@ -81,13 +81,8 @@ def identify(
 
     check_one(card, fmu, system)
     _check_given(card is not None, given)
-    out = out or default_out(Path(recordings[0]).stem)
-    if card is not None:
-        how = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
-        _card(recordings, card, out, how, columns, units, layout, as_json, force)
-        return
-    how = {"free": free or (), **{name: given[name] for name in PLAIN}}
-    _model(recordings, heldout or [], out, how, (set_, bounds, columns, units), as_json, force)
+    given["out"] = out or default_out(Path(recordings[0]).stem)
+    (_model if card is None else _card)(given)
 
 
 def _check_given(of_card: bool, given: Mapping[str, Any]) -> None:
@@ -100,67 +95,52 @@ def _check_given(of_card: bool, given: Mapping[str, Any]) -> None:
             raise InputError(f"{option} goes with {other} alone; leave it out.", culprit=option)
 
 
-def _card(
-    recordings: list[Path],
-    card: str,
-    out: Path,
-    given: Mapping[str, Any],
-    columns: Sequence[str] | None,
-    units: Sequence[str] | None,
-    layout: Sequence[str] | None,
-    as_json: bool,
-    force: bool,
-) -> None:
+def _card(given: Mapping[str, Any]) -> None:
     from cosim.api.identify import identify as find
     from cosim.estimation.identify.deliver import check_out
     from cosim.reading import read_recordings
     from pyfmi_models.card import read_card
 
+    out, force = given["out"], given["force"]
     check_out(out, force)
-    believed = read_card(card)
-    read = read_recordings(recordings, believed.columns, columns, units, believed.mount.motion, layout)
+    believed = read_card(given["card"])
+    written = (given["columns"], given["units"], believed.mount.motion, given["layout"])
+    read = read_recordings(given["recordings"], believed.columns, *written)
     seconds, several = sum(one.duration for one in read), "s" * (len(read) > 1)
     say(f"Read {len(read)} recording{several}, {seconds:.0f} s; card {believed.mount.name}")
+    how = {name: given[name] for name in ("cut", "keep_inertia", "starts", "seed")}
     with stage("identifying") as progress:
-        done = find(read, believed, out, force=force, on_progress=progress.log, **given)
-    if as_json:
+        done = find(read, believed, out, free=given["free"] or (), force=force, on_progress=progress.log, **how)
+    if given["as_json"]:
         put_json(done.as_json())
     else:
         put(str(done))
         say(f"Wrote {out / 'card.toml'}, identify.json and the figures")
 
 
-def _model(
-    recordings: list[Path],
-    heldout: list[Path],
-    out: Path,
-    given: Mapping[str, Any],
-    pairs: tuple[Sequence[str] | None, ...],
-    as_json: bool,
-    force: bool,
-) -> None:
+def _model(given: Mapping[str, Any]) -> None:
     from cosim.api.identify import identify as find
     from cosim.reading import pairs_of
 
-    set_, bounds, columns, units = (
-        pairs_of(option, one) for option, one in zip(("--set", "--bounds", "--columns", "--units"), pairs, strict=True)
-    )
-    values = {name: _number("--set", name, text) for name, text in set_.items()}
-    limits = {name: _range(name, text) for name, text in bounds.items()}
+    out = given["out"]
+    pairs = {name: pairs_of(f"--{name.strip('_')}", given[name]) for name in ("set_", "bounds", "columns", "units")}
+    values = {name: _number("--set", name, text) for name, text in pairs["set_"].items()}
+    limits = {name: _range(name, text) for name, text in pairs["bounds"].items()}
     with stage("identifying") as progress, _going_on(out):
         done = find(
-            recordings,
+            given["recordings"],
             out=out,
-            heldout=heldout or None,
+            free=given["free"] or (),
+            heldout=given["heldout"] or None,
             set=values,
             bounds=limits,
-            columns=columns,
-            units=units,
-            force=force,
+            columns=pairs["columns"],
+            units=pairs["units"],
+            force=given["force"],
             on_progress=progress.log,
-            **given,
+            **{name: given[name] for name in PLAIN},
         )
-    put_json(done.as_json()) if as_json else put(str(done))
+    put_json(done.as_json()) if given["as_json"] else put(str(done))
     say(f"Wrote {', '.join(str(path) for path in done.files.values())}")
 
 

@@ -44,7 +44,7 @@ class Correction:
 
     def deliver(self, better: Card, out: Path) -> Improved:
         """Write `correction.fmu`, and `improved.ssp` where it can be had; return what was written, and why not more."""
-        fmi = self._fmi
+        fmi: Literal[2, 3] = 2 if describe(self.box.fmu).fmiVersion.startswith("2") else 3
         model = correction(self.like.plant(), better.plant())
         export_fmu(model, out / "correction.fmu", fmi=fmi, force=True)
         entry: Improved = {"correction": "correction.fmu", "base_fmu": self.box.label}
@@ -55,10 +55,6 @@ class Correction:
             return entry | Improved(no_ssp=refused)
         export_ssp(self._system(better), out / "improved.ssp", fmi=fmi, force=True)
         return entry | Improved(ssp="improved.ssp")
-
-    @property
-    def _fmi(self) -> Literal[2, 3]:
-        return 2 if describe(self.box.fmu).fmiVersion.startswith("2") else 3
 
     @property
     def _linear(self) -> bool:
@@ -86,11 +82,8 @@ class Correction:
         plant = self._archive()
         tau, q, v = (f"plant.{self._theirs(name)}" for name in OURS)
         names = ("position", "velocity", "acceleration")
-        given = [
-            (f"set_point.{name}", f"controller.{to}") for name, to in zip(names, ("q_d", "v_d", "a_d"), strict=True)
-        ]
         wires = [
-            *given,
+            *((f"set_point.{name}", f"controller.{to}") for name, to in zip(names, ("q_d", "v_d", "a_d"), strict=True)),
             ("controller.tau", "correction.tau"),
             ("correction.corrected", tau),
             (q, "correction.q"),
@@ -119,21 +112,15 @@ class Correction:
         if better.controller:
             return better
         rate = BANDWIDTHS[-1]
-        return replace(
-            better,
-            controller=ControllerSection(kp=rate**2 / 4, kd=rate, observer_bandwidth=2 * rate, compensation="C1"),
-        )
+        section = ControllerSection(kp=rate**2 / 4, kd=rate, observer_bandwidth=2 * rate, compensation="C1")
+        return replace(better, controller=section)
 
     def _archive(self) -> Archive:
         kinds = {
             name: Variable(name=self._theirs(name), unit=u[self._linear], description="") for name, u in OURS.items()
         }
-        return Archive(
-            path=self.box.fmu,
-            description=describe(self.box.fmu).modelName,
-            inputs=(kinds["tau"],),
-            outputs=(kinds["q"], kinds["v"]),
-        )
+        name, outputs = describe(self.box.fmu).modelName, (kinds["q"], kinds["v"])
+        return Archive(path=self.box.fmu, description=name, inputs=(kinds["tau"],), outputs=outputs)
 
 
 def _same(stated: str, ours: str) -> bool:

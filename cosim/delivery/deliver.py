@@ -99,10 +99,8 @@ def deliver(
     _write_card(better, found, out)
     if found.adds_physics:
         on_progress("building the improved FMU")
-        improved = (
-            Improved(card=CARD) | _fmus(better, found, heldout[0], out) | _proven_range(found) | more(better, out)
-        )
-        found = replace(found, improved=improved)
+        improved = Improved(card=CARD) | _fmus(better, found, heldout[0], out) | _proven_range(found)
+        found = replace(found, improved=improved | more(better, out))
     loops.close("after", outcome.card.plant(), out / found.improved["fmu"] if "fmu" in found.improved else None)
     if outcome.experiment and better.controller:
         with replacing(out / SCENARIO, True) as partial:
@@ -143,7 +141,7 @@ def as_json(found: Diagnosis) -> JsonObject:
     held = found.heldout
     whole = {
         "verdict": list(found.verdict),
-        "effects": _effects((*found.findings, *_shaken(found))),
+        "effects": _effects(found),
         "friction_law": found.friction_law,
         "delivered": list(dict.fromkeys(map(id_of, found.delivered))),
         "ambiguous_with": [list(map(id_of, group)) for group in found.ambiguous_with],
@@ -171,14 +169,11 @@ def as_json(found: Diagnosis) -> JsonObject:
     return cast(JsonObject, whole)
 
 
-def _shaken(found: Diagnosis) -> tuple[Finding, ...]:
-    return (broadband_finding(found.broadband, found.motion),) if found.broadband else ()
-
-
-def _effects(findings: Sequence[Finding]) -> list[JsonObject]:
+def _effects(found: Diagnosis) -> list[JsonObject]:
     """One entry for each id, in their order; further couplings, with other neighbours, are in that of the first."""
+    shaken = (broadband_finding(found.broadband, found.motion),) if found.broadband else ()
     groups: dict[str, list[Finding]] = {}
-    for one in findings:
+    for one in (*found.findings, *shaken):
         groups.setdefault(one.effect, []).append(one)
     return [
         _effect(first) | ({"further": [_effect(one) for one in others]} if others else {})
@@ -233,16 +228,8 @@ def _bound(finding: Finding) -> JsonObject:
 
 
 def _heldout(held: HeldOut) -> JsonObject:
-    return {
-        "name": held.name,
-        "nominal_rms": held.nominal_rms,
-        "before_rms": held.before_rms,
-        "after_rms": held.after_rms,
-        "floor_rms": held.floor_rms,
-        "cutoff_hz": held.cutoff_hz,
-        "motion_hz": held.motion_hz,
-        "unvetoed_rms": held.unvetoed_rms,
-        "possible_rms": held.possible_rms,
+    names = ("name", "nominal_rms", "before_rms", "after_rms", "floor_rms", "cutoff_hz", "motion_hz", "unvetoed_rms")
+    return {name: getattr(held, name) for name in (*names, "possible_rms")} | {
         "confidence_interval": list(held.confidence_interval),
         "clear_motion": held.sliding,
         "black_box_rms": held.black_box_rms,
@@ -251,14 +238,8 @@ def _heldout(held: HeldOut) -> JsonObject:
 
 
 def _provenance(train: Sequence[Recording], heldout: Sequence[Recording], card: Card, command: str) -> Provenance:
-    recordings: list[Source] = [
-        {
-            "name": one.name,
-            "sha256": one.sha256,
-            "role": role,
-            "seconds": one.duration,
-            "rate_hz": 1 / one.sample_time,
-        }
+    recordings = [
+        Source(name=one.name, sha256=one.sha256, role=role, seconds=one.duration, rate_hz=1 / one.sample_time)
         for role, group in (("train", train), ("heldout", heldout))
         for one in group
     ]

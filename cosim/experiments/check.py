@@ -6,9 +6,10 @@ default           the default experiment: compared with a result that the manife
 description       FMPy's validation of the model description
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,11 +74,13 @@ def check(
         outcomes = []
         for one in experiments:
             say(one.name)
-            outcomes.append(_guarded(cell, path, one, rtol, timeout, interface))
+            outcome, lost = _in_cell(cell, timeout, run_experiment, path, one, rtol, interface)
+            outcomes.append(outcome or Outcome(one, False, lost))
         findings = [_description(path)]
         if not any(one.run for one in outcomes):
             say(DEFAULT)
-            findings += _any_fmu(cell, path, timeout, interface)
+            found, lost = _in_cell(cell, timeout, default_findings, path, interface)
+            findings += found or [Finding("runs", False, lost)]
     finally:
         cell.close()
     standard = f"FMI-LS-REF {manifest.version}" if manifest else ""
@@ -103,20 +106,15 @@ def _experiments(path: Path, manifest: Manifest | None) -> list[Experiment]:
     return found
 
 
-def _guarded(cell: Cell, path: Path, experiment: Experiment, rtol: float, timeout: float, interface: str) -> Outcome:
+def _in_cell(cell: Cell, timeout: float, function: Callable[..., Any], *arguments: Any) -> tuple[Any, str]:
+    """What a function finds in a process of its own; or None, and a sentence on what came instead."""
     try:
-        outcome: Outcome = cell.call(run_experiment, path, experiment, rtol, interface, timeout=timeout)
+        return cell.call(function, *arguments, timeout=timeout), ""
     except LostError as loss:
-        return Outcome(experiment, False, _sentence(loss, timeout))
+        late = f"The FMU did not end its simulation within {timeout:g} s."
+        return None, late if loss.status == "timeout" else f"The FMU crashed: {ending(loss.code)}."
     except CosimError as error:
-        return Outcome(experiment, False, str(error))
-    return outcome
-
-
-def _sentence(loss: LostError, timeout: float) -> str:
-    if loss.status == "timeout":
-        return f"The FMU did not end its simulation within {timeout:g} s."
-    return f"The FMU crashed: {ending(loss.code)}."
+        return None, str(error)
 
 
 def _description(path: Path) -> Finding:
@@ -131,16 +129,6 @@ def _description(path: Path) -> Finding:
         return Finding("description", True, "FMPy's validation has no complaint")
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return Finding("description", False, f"{' '.join(problems[0].split())[:300]}{more}")
-
-
-def _any_fmu(cell: Cell, path: Path, timeout: float, interface: str) -> Sequence[Finding]:
-    try:
-        findings: Sequence[Finding] = cell.call(default_findings, path, interface, timeout=timeout)
-    except LostError as loss:
-        return [Finding("runs", False, _sentence(loss, timeout))]
-    except CosimError as error:
-        return [Finding("runs", False, str(error))]
-    return findings
 
 
 def default_findings(path: Path, interface: str = "") -> list[Finding]:

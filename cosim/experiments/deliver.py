@@ -11,17 +11,12 @@ from cosim.experiments.check import Checked
 from cosim.experiments.comparison import Compared
 from cosim.experiments.run import Outcome
 from cosim.plots.compare import Overlay, write_figure
-from cosim.support.files import check_free, directory, replacing
+from cosim.support.files import directory, replacing
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 
 JSON = "check.json"
 WORDS = {True: "pass", False: "FAIL"}
-
-
-def check_out(out: Path, force: bool) -> None:
-    """Refuse, before any work is done, a folder that holds a check already (raises OutputError)."""
-    check_free(out / JSON, force)
 
 
 def deliver(done: Checked, out: Path, force: bool) -> dict[str, Path]:

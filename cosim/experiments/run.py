@@ -91,9 +91,8 @@ def _run(path: Path, experiment: Experiment, rtol: float, interface: str) -> Out
     if reference is not None:
         _check_time(reference, settings)
         if not reference.numbers and not reference.texts:
-            raise FmuError(
-                f"None of the columns of {experiment.references} is a variable of {path}.", culprit=str(path)
-            )
+            text = f"None of the columns of {experiment.references} is a variable of {path}."
+            raise FmuError(text, culprit=str(path))
     system = system_of(path, ports, settings, stimuli, values, reference, interface)
     recording = simulate(system).recording
     if reference is None:
@@ -123,10 +122,8 @@ def settings_of(
         raise FmuError(text, culprit=experiment.name)
     ticks = max(1, floor((stop - start) / step * (1 + 1e-9) + 1e-6))
     if ticks > MOST:
-        text = (
-            f"The experiment goes from {start:g} to {stop:g} s in {ticks:,} steps of {step:g} s; {MOST:,} are the most."
-        )
-        raise FmuError(text, culprit=experiment.name)
+        steps = f"{ticks:,} steps of {step:g} s; {MOST:,} are the most"
+        raise FmuError(f"The experiment goes from {start:g} to {stop:g} s in {steps}.", culprit=experiment.name)
     return Settings(start, step, ticks)
 
 
@@ -148,7 +145,9 @@ def system_of(
             raise FmuError(f'The stimulus has "{name}", which is no input of {path}.', culprit=name)
         signals[f"column {k}"] = Samples(_on_ticks(stimuli, series, settings, port), port.unit, name)
         wires.append(Wire(f"column {k}.value", f"{MODEL}.{name}", cast=port.type not in FLOATS))
-    names = [*reference.numbers, *reference.texts] if reference is not None else _outputs(ports)
+    outputs = [port for port in ports.values() if port.causality == "output" and not port.array]
+    names = [port.name for port in outputs if port.type != "Clock"]
+    names = [*reference.numbers, *reference.texts] if reference is not None else names
     return System(
         components={MODEL: Fmu(path, interface)},
         records={name: Record(f"{MODEL}.{name}") for name in names},
@@ -186,7 +185,8 @@ def _judged(
         simulated[name] = column[near] if on or exact else np.interp(ticks, np.arange(len(column)), column)
         compared.append(compare_numbers(name, reference.times, values, simulated[name], rtol, exact))
     for name, texts in reference.texts.items():
-        cells = [_text(recording.others[name][k]) for k in near]
+        shown = [recording.others[name][k] for k in near]
+        cells = [one.hex() if isinstance(one, bytes) else str(one) for one in shown]
         compared.append(compare_texts(name, reference.times, texts, cells))
     passed = all(one.passed for one in compared)
     units = {name: ports[name].unit for name in simulated}
@@ -247,15 +247,5 @@ def _on_ticks(stimuli: Any, values: Array, settings: Settings, port: Port) -> Ar
     return np.where(exact, held, np.interp(at, stimuli.times, values))
 
 
-def _outputs(ports: Mapping[str, Port]) -> list[str]:
-    return [
-        name for name, port in ports.items() if port.causality == "output" and not port.array and port.type != "Clock"
-    ]
-
-
 def _first(*values: Any) -> float:
     return next(float(one) for one in values if one is not None)
-
-
-def _text(value: Any) -> str:
-    return value.hex() if isinstance(value, bytes) else str(value)

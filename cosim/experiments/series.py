@@ -44,8 +44,9 @@ def series_of(path: Path, member: str, ports: Mapping[str, Port]) -> Series:
     """
     content = read(path, member, complaint_of(path))
     if b"\0" in content[:HEAD]:
+        kind = "HDF5" if content.startswith(b"\x89HDF") else "of no known kind"
         rule = 'a table as text, with the first column "time", is read in its place'
-        raise FmuError(f"{path}: {member} is no CSV but binary ({_kind(content)}); {rule}.", culprit=member)
+        raise FmuError(f"{path}: {member} is no CSV but binary ({kind}); {rule}.", culprit=member)
     text = content.decode("utf-8-sig", "replace")
     rows = [row for row in csv.reader(StringIO(text)) if row]
     if len(rows) < 2 or rows[0][0].strip().lower() != TIME:
@@ -75,10 +76,6 @@ def series_of(path: Path, member: str, ports: Mapping[str, Port]) -> Series:
         else:
             numbers[name] = _numbers(path, member, name, columns[name])
     return Series(times, numbers, texts, tuple(name for name in names[1:] if name not in ports))
-
-
-def _kind(content: bytes) -> str:
-    return "HDF5" if content.startswith(b"\x89HDF") else "of no known kind"
 
 
 def _elements(path: Path, member: str, port: Port, cells: list[str]) -> dict[str, Array]:

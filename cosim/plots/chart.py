@@ -80,7 +80,8 @@ class Chart:
 
     def line(self, x: Array, y: Array, colour: str = AFTER, width: float = 1.4) -> None:
         """Join points."""
-        points = _points(self.x.at(x), self.y.at(y))
+        pairs = zip(self.x.at(x).tolist(), self.y.at(y).tolist(), strict=True)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs if isfinite(a) and isfinite(b))
         self.parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}"/>')
 
     def band(self, x: Array, low: Array, high: Array, colour: str = AFTER) -> None:
@@ -123,8 +124,3 @@ def _digits(values: Sequence[float]) -> list[str]:
     digits = max(0, floor(log10(largest) + 1e-9) - floor(log10(step) + 1e-9)) if largest else 0
     form = f".{places}f" if 1e-3 <= largest < 1e7 else f".{digits}e"
     return [f"{value:{form}}".replace("-", "−") if value else "0" for value in values]
-
-
-def _points(x: Array, y: Array) -> str:
-    pairs = zip(x.tolist(), y.tolist(), strict=True)
-    return " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs if isfinite(a) and isfinite(b))

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from cosim.plots.digest import in_words
-from cosim.plots.explorer import INKS, Sheet, record, script_of_page
-from cosim.plots.quantities import Scale, number, scale_of
+from cosim.plots.explorer import INKS, Sheet, of_page, record, script_of_page
+from cosim.plots.quantities import Scale, labelled, number, scale_of
 from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, Array
 from cosim.support.files import replacing
+from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 
 COLOURS = (MEASURED, BEFORE, AFTER, GREY)
@@ -61,15 +62,13 @@ class Overlay:
 
     def _difference(self, name: str, k: int) -> Difference:
         first, gap = self.columns[name][0], self.columns[name][k] - self.columns[name][0]
-        seen = np.isfinite(gap)
+        seen, named = np.isfinite(gap), (name, self.names[k], self.units.get(name, ""))
         if not seen.any():
-            return Difference(name, self.names[k], self.units.get(name, ""), np.nan, np.nan, np.nan, np.nan)
+            return Difference(*named, np.nan, np.nan, np.nan, np.nan)
         rms, spread = float(np.sqrt(np.mean(gap[seen] ** 2))), float(np.std(first[seen]))
         most = int(np.nanargmax(np.abs(gap)))
         relative = rms / spread if spread > 0 else float("inf") if rms else 0.0
-        return Difference(
-            name, self.names[k], self.units.get(name, ""), rms, relative, float(gap[most]), float(self.t[most])
-        )
+        return Difference(*named, rms, relative, float(gap[most]), float(self.t[most]))
 
 
 def figure_of(overlay: Overlay) -> Any:
@@ -89,8 +88,8 @@ def figure_of(overlay: Overlay) -> Any:
                 top.plot(overlay.t, scale.factor * one, color=colour, lw=1.1, ls=dashes, label=overlay.names[k])
                 if k:
                     below.plot(overlay.t, rest.factor * (one - values[0]), color=colour, lw=0.9)
-            top.set_title(_titled(name, scale.unit), loc="left")
-            below.set_title(_titled(f"difference from {overlay.names[0]}", rest.unit), loc="left")
+            top.set_title(labelled(name, in_words(scale.unit)), loc="left")
+            below.set_title(labelled(f"difference from {overlay.names[0]}", in_words(rest.unit)), loc="left")
             top.grid(axis="y")
             below.grid(axis="y")
         panels[0].legend(loc="upper right", ncols=len(overlay.names), frameon=False)
@@ -110,7 +109,9 @@ def write_figure(overlay: Overlay, path: Path, force: bool) -> Path:
 def write_page(overlay: Overlay, notes: Sequence[str], path: Path, force: bool) -> Path:
     """Write the page: a table of differences, and the explorer; self-contained, no network."""
     rows = [_row(one) for one in overlay.differences()]
-    shown = {"names": overlay.names, "lead": _lead(overlay), "notes": notes, "rows": rows}
+    seconds, count = float(overlay.t[-1] - overlay.t[0]), len(overlay.columns)
+    lead = f"{count} columns over {seconds:.4g} s that all have in common, {len(overlay.t):,} rows."
+    shown = {"names": overlay.names, "lead": lead, "notes": notes, "rows": rows}
     return write_explorer("cosim.plots", "compare.html.j2", overlay.names, {"": overlay}, shown, path, force)
 
 
@@ -158,23 +159,12 @@ def write_explorer(
     return path
 
 
-def _lead(overlay: Overlay) -> str:
-    seconds = float(overlay.t[-1] - overlay.t[0])
-    return f"{len(overlay.columns)} columns over {seconds:.4g} s that all have in common, {len(overlay.t):,} rows."
-
-
 def _row(one: Difference) -> dict[str, str]:
     scale = scale_of(one.unit, abs(one.largest))
     rms, largest = (number(scale.factor * value, 3) for value in (one.rms, one.largest))
     relative = "–" if not np.isfinite(one.relative) else in_share(one.relative)
-    row = {
-        "column": one.column,
-        "other": one.other,
-        "unit": in_words(scale.unit) or "not stated",
-        "rms": rms,
-        "relative": relative,
-    }
-    return row | {"largest": largest, "at": f"{one.at:.6g}"}
+    row = {"column": one.column, "other": one.other, "unit": in_words(scale.unit) or "not stated"}
+    return row | {"rms": rms, "relative": relative, "largest": largest, "at": f"{one.at:.6g}"}
 
 
 def in_share(ratio: float) -> str:
@@ -182,7 +172,7 @@ def in_share(ratio: float) -> str:
     return f"{100 * ratio:.3g} %" if ratio < 10 else f"{number(ratio, 3)} times"
 
 
-def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
+def payload(overlays: Mapping[str, Overlay]) -> JsonObject:
     """What `explorer.js` reads: a record for each column of overlays, which all lie as many over each other.
 
     Args:
@@ -194,29 +184,21 @@ def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
     gaps = [(f"d{k}", INKS[k % len(INKS)], ()) for k in range(1, len(keys))]
     sheets = (Sheet("", 0.62, lines), Sheet("", 0.38, gaps))
     share = 1 / sum(len(one.columns) for one in overlays.values())
-    return {
-        "sheets": [sheet.as_json() for sheet in sheets],
-        "differences": [],
-        "recordings": [
-            _record(one, name, f"{before}{name}", share) for before, one in overlays.items() for name in one.columns
-        ],
-        "first": "all",
-        "open": 0,
-    }
+    columns = [(one, name, f"{before}{name}") for before, one in overlays.items() for name in one.columns]
+    return of_page(sheets, [_record(*column, share) for column in columns])
 
 
-def _record(overlay: Overlay, name: str, label: str, share: float) -> dict[str, Any]:
+def _record(overlay: Overlay, name: str, label: str, share: float) -> JsonObject:
     values, keys = overlay.columns[name], [f"r{k}" for k in range(len(overlay.names))]
     scale, rest = overlay.scale(name, values), overlay.scale(name, values - values[0])
     signals = {key: scale.factor * one for key, one in zip(keys, values, strict=True)}
     signals |= {f"d{k}": rest.factor * (values[k] - values[0]) for k in range(1, len(keys))}
-    made: dict[str, Any] = dict(record(label, overlay.t, signals, share))
+    made = record(label, overlay.t, signals, share)
     gap = np.nanmax(np.abs(values[1:] - values[0]), axis=0)
     centre = float(overlay.t[int(np.nanargmax(gap))]) if np.isfinite(gap).any() else float(overlay.t[0])
     around = AROUND * float(overlay.t[-1] - overlay.t[0])
-    titles = [_titled(name, scale.unit), _titled(f"difference from {overlay.names[0]}", rest.unit)]
+    titles = [
+        labelled(name, in_words(scale.unit)),
+        labelled(f"difference from {overlay.names[0]}", in_words(rest.unit)),
+    ]
     return {**made, "titles": titles, "spans": {"largest": [centre - around, centre + around]}}
-
-
-def _titled(title: str, unit: str) -> str:
-    return f"{title} [{in_words(unit)}]" if unit else title

@@ -4,7 +4,7 @@ Columns with the usual names (see `ROLES`), with or without a prefix ("azimuth_q
 is its set point minus its position, or minus its reading where no position is recorded.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -100,7 +100,9 @@ def digest(path: Path) -> Digest:
     # pre_buffer, on by default, keeps every piece that was read until the file is closed: the whole recording.
     with parquet.ParquetFile(path, pre_buffer=False) as file:
         fields = {one.name: (one.metadata or {}).get(UNIT_KEY, b"").decode() for one in file.schema_arrow}
-        return condense(_pieces(file), fields, file.metadata.num_rows)
+        batches = file.iter_batches(batch_size=1 << 16)
+        pieces = ({name: _values(batch.column(name)) for name in batch.schema.names} for batch in batches)
+        return condense(pieces, fields, file.metadata.num_rows)
 
 
 def condense(pieces: Iterable[Piece], units: Mapping[str, str], rows: int) -> Digest:
@@ -212,11 +214,6 @@ class Spectrum:
         size = np.diff(first, append=len(part))
         mean = np.add.reduceat(power, first) / size
         return np.add.reduceat(frequency, first) / size, np.sqrt(mean)
-
-
-def _pieces(file: Any) -> Iterator[Piece]:
-    for batch in file.iter_batches(batch_size=1 << 16):
-        yield {name: _values(batch.column(name)) for name in batch.schema.names}
 
 
 def _values(column: Any) -> Array:

@@ -66,6 +66,19 @@ def record(name: str, t: Array, signals: Mapping[str, Array], share: float = 1.0
     }
 
 
+def of_page(sheets: Sequence[Sheet], records: Sequence[Json], first: str = "all", **more: Json) -> JsonObject:
+    """What `explorer.js` reads.
+
+    Args:
+        sheets: panels of each record.
+        records: those of `record`, with `spans` that buttons go to.
+        first: the span that is shown first.
+        more: `differences` [name, one, other] that the page takes itself, `open`: the record that is shown first.
+    """
+    told: JsonObject = {"sheets": [sheet.as_json() for sheet in sheets], "differences": more.get("differences", [])}
+    return told | {"recordings": records, "first": first, "open": more.get("open", 0)}
+
+
 def script_of_page() -> tuple[str, str]:
     """Return the script and its SHA-256 in base64, by which a page lets it run and nothing else."""
     script = files("cosim.plots").joinpath("explorer.js").read_text("utf-8")

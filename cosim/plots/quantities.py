@@ -43,6 +43,11 @@ def joined(value: str, unit: str) -> str:
     return f"{value}{unit}" if not unit or unit.startswith(_TIGHT) else f"{value}\N{NO-BREAK SPACE}{unit}"
 
 
+def labelled(name: str, unit: str) -> str:
+    """Return a name with its unit behind it in brackets, if it has one."""
+    return f"{name} [{unit}]" if unit else name
+
+
 def number(value: float, digits: int = 2) -> str:
     """Return a value with `digits` significant digits and a true minus sign, without an exponent where readable."""
     if not isfinite(value):

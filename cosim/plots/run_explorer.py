@@ -14,8 +14,8 @@ import numpy as np
 
 from cosim.data.columns import doubles
 from cosim.plots.digest import Digest, in_words
-from cosim.plots.explorer import Sheet, record, script_of_page
-from cosim.plots.quantities import scale_of
+from cosim.plots.explorer import Sheet, of_page, record, script_of_page
+from cosim.plots.quantities import labelled, scale_of
 from cosim.plots.style import Array
 from cosim.support.plain import JsonObject
 
@@ -43,15 +43,8 @@ def explorer(recording: Path, small: Digest) -> tuple[str, str, str]:
         records = list(_records(file, small))
     if not records:
         return "", "", ""
-    data: JsonObject = {
-        "sheets": [sheet.as_json() for sheet in SHEETS],
-        "differences": [],
-        "recordings": records,
-        "first": "all",
-        "open": 0,
-    }
     script, digest = script_of_page()
-    text = json.dumps(data).replace("<", "\\u003c")
+    text = json.dumps(of_page(SHEETS, records)).replace("<", "\\u003c")
     style = (files("cosim.plots") / "compare.css").read_text("utf-8")
     parts = [
         '<h2>Look closer</h2><div id="explorer" hidden><div class="bar"><select aria-label="Column"></select>',
@@ -95,8 +88,7 @@ def _record(name: str, t: Array, signals: dict[str, Array], unit: str, share: fl
     """One entry of the list, in the unit that fits its first signal."""
     scale = scale_of(unit, float(np.nanmax(np.abs(signals["column"]), initial=0.0)))
     shown = {key: values * scale.factor for key, values in signals.items()}
-    printed = in_words(scale.unit)
-    return {**record(name, t, shown, share), "titles": [f"{name} [{printed}]" if printed else name]}
+    return {**record(name, t, shown, share), "titles": [labelled(name, in_words(scale.unit))]}
 
 
 def _column(file: "ParquetFile", name: str) -> Array:

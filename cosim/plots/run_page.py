@@ -17,7 +17,7 @@ import numpy as np
 from cosim.data.columns import ORIGIN_KEY
 from cosim.plots.chart import Chart
 from cosim.plots.digest import ERROR, Axis, Digest, Line, digest, in_words
-from cosim.plots.quantities import Scale, joined, number, scale_of
+from cosim.plots.quantities import Scale, joined, labelled, number, scale_of
 from cosim.plots.run_explorer import explorer, policy
 from cosim.plots.style import AFTER, BEFORE, MEASURED
 from cosim.support.files import replacing
@@ -135,7 +135,7 @@ def _of_axis(small: Digest, axis: Axis) -> Iterator[str]:
 def _over_time(small: Digest, name: str, title: str, colour: str = AFTER) -> str:
     line = small.lines[name]
     scale = _scale(line)
-    chart = Chart.over(_titled(title, scale), "time [s]", (small.start, small.end), _shown(line, scale), SIZE)
+    chart = Chart.over(labelled(title, scale.unit), "time [s]", (small.start, small.end), _shown(line, scale), SIZE)
     middle = small.start + (small.end - small.start) * (np.arange(len(line.low)) + 0.5) / len(line.low)
     chart.band(middle, line.low * scale.factor, line.high * scale.factor, colour)
     return chart.svg()
@@ -146,7 +146,7 @@ def _friction_over_speed(small: Digest, speed: str, friction: str) -> str:
     across, up = _scale(v), _scale(f)
     low, high = _shown(v, across)
     room = 0.03 * (high - low) or 1.0
-    title, below = _titled("friction over speed", up), f"speed [{across.unit}]"
+    title, below = labelled("friction over speed", up.unit), f"speed [{across.unit}]"
     chart = Chart.over(title, below, (low - room, high + room), _shown(f, up), SIZE)
     chart.line(v.dots * across.factor, f.dots * up.factor, MEASURED, 0.9)
     return chart.svg()
@@ -175,10 +175,6 @@ def _scale(line: Line) -> Scale:
 def _shown(line: Line, scale: Scale) -> tuple[float, float]:
     low, high = line.span
     return low * scale.factor, high * scale.factor
-
-
-def _titled(title: str, scale: Scale) -> str:
-    return f"{title} [{scale.unit}]" if scale.unit else title
 
 
 def _table(small: Digest) -> str:

@@ -1,6 +1,5 @@
 """One self-contained HTML page of a diagnosis: no network, at most 1 MB, first screen without JavaScript."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +28,8 @@ def render(diagnosis: "Diagnosis") -> str:
 
 def write_report(diagnosis: "Diagnosis", path: Path) -> Path:
     """Write the page and return its path; a file that is there already is replaced, never left half written."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_text(render(diagnosis), encoding="utf-8")
-    os.replace(partial, path)
+    from cosim.support.files import replacing
+
+    with replacing(path, True) as partial:
+        partial.write_text(render(diagnosis), encoding="utf-8")
     return path

@@ -1,7 +1,5 @@
 """Figures of findings that show in time or frequency: lag, clock, ripple in time, rest and reversal."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
@@ -25,9 +23,6 @@ from cosim.report.figures_effect import (
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture, heading
 from cosim.support.statistics import hann
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TOP_HZ = 30.0
 """The residual protocol's filter: nothing above it is left to see."""
@@ -56,31 +51,22 @@ def phase(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     use = (f > 0.3) & (f < TOP_HZ) & (power > 1e-4 * power.max())
     if use.sum() < 4:
         return None
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     for model, colour, mark in ((before, BEFORE, "s"), (after, AFTER, "o")):
         angle = np.degrees(np.angle(np.sum(tau * np.conj(model), axis=0)))[use]
         axes.plot(f[use], angle, mark, ms=4, mfc="white" if mark == "s" else colour, mec=colour)
-    _pure_delay(finding, axes, f[use])
-    axes.set_xlabel("frequency [Hz]")
-    heading(axes, "phase error [°]")
-    return sheet.picture(f"{finding.title}. {_DELAY}", _DELAY)
-
-
-_DELAY = "Squares before, dots after. Dashed: a pure delay of the size found."
-
-
-def _pure_delay(finding: Finding, axes: "Axes", f: Array) -> None:
     delay = finding.parameters.get("delay_ms", finding.parameters.get("time_constant_ms", 0.0))
-    axes.plot(f, 0.36 * delay * f, color=MEASURED, dashes=(4, 2), lw=1.2)
+    axes.plot(f[use], 0.36 * delay * f[use], color=MEASURED, dashes=(4, 2), lw=1.2)
+    heading(axes, "phase error [°]", below="frequency [Hz]")
+    caption = "Squares before, dots after. Dashed: a pure delay of the size found."
+    return sheet.picture(f"{finding.title}. {caption}", caption)
 
 
 def spectrum(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     """Draw the amplitude of the error over frequency, before and after."""
     f, errors = spectra(chosen, chosen.before, chosen.after)
     use = (f > 0.2) & (f < TOP_HZ)
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     for rows, colour, dashes in zip(errors, (BEFORE, AFTER), ((4, 2), (None, None)), strict=True):
         level = np.sqrt(np.mean(np.abs(rows) ** 2, axis=0)) * scales.torque.factor
         axes.plot(f[use], level[use], color=colour, dashes=dashes, lw=1.3)
@@ -98,14 +84,12 @@ def clock(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     starts = np.arange(0, len(chosen.t) - size, size)
     if len(starts) < 3:
         return None
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     for error, colour, mark in ((chosen.before, BEFORE, "s"), (chosen.after, AFTER, "o")):
         lag = [1e3 * _lag(error[s : s + size], slope[s : s + size]) for s in starts]
         axes.plot(chosen.t[starts + size // 2], lag, mark, ms=6, mfc="white" if mark == "s" else colour, mec=colour)
     axes.axhline(0, color=GREY, lw=0.8)
-    axes.set_xlabel("time in the recording [s]")
-    heading(axes, "lag of motion behind torque [ms]")
+    heading(axes, "lag of motion behind torque [ms]", below="time in the recording [s]")
     caption = "One mark every 5 s. Squares before, dots after. A slope is a clock, a level is a delay."
     return sheet.picture(f"{finding.title}. {caption}", caption)
 
@@ -141,15 +125,13 @@ def breakaway(finding: Finding, chosen: Samples, scales: Scales) -> Picture | No
     starts, rest = _starts(chosen)
     if len(starts) < 3:
         return None
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     window = max(3, int(0.3 * rate(chosen)))
     for error, colour, mark in ((chosen.before, BEFORE, "s"), (chosen.after, AFTER, "o")):
         peak = [float(np.max(np.abs(error[s : s + window]))) * scales.torque.factor for s in starts]
         axes.plot(rest, peak, mark, ms=6, mfc="white" if mark == "s" else colour, mec=colour)
     plain_decades(axes)
-    axes.set_xlabel("rest before the start [s]")
-    heading(axes, f"error at break-away [{scales.torque.unit}]")
+    heading(axes, f"error at break-away [{scales.torque.unit}]", below="rest before the start [s]")
     caption = f"{len(starts)} starts, one mark each. Squares before, dots after."
     return sheet.picture(f"{finding.title}. {caption}", caption)
 

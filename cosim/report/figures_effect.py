@@ -19,23 +19,22 @@ Draw = Callable[[Finding, Samples, Scales], Picture | None]
 HEIGHT = 232
 
 
-def blank(finding: Finding) -> Sheet:
+def blank(finding: Finding) -> tuple[Sheet, "Axes"]:
     """Return the empty figure of a finding."""
-    return Sheet(f"effect-{''.join(c for c in finding.name if c.isalnum())}", HEIGHT)
+    sheet = Sheet(f"effect-{''.join(c for c in finding.name if c.isalnum())}", HEIGHT)
+    return sheet, sheet.axes()
 
 
 def error_over(
     finding: Finding, x: Array, y: tuple[Array, Array], edges: Array, axis: str, scales: Scales
 ) -> tuple[Sheet, "Axes"]:
     """Draw the mean error before and after over any coordinate, with 95 % bands."""
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     for residual, colour, dashes in zip(y, (BEFORE, AFTER), ((4, 2), (None, None)), strict=True):
         line(axes, curve(x, residual * scales.torque.factor, edges), colour, dashes)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    axes.set_xlabel(axis)
     axes.locator_params(axis="y", nbins=5)
-    heading(axes, f"mean error [{scales.torque.unit}]")
+    heading(axes, f"mean error [{scales.torque.unit}]", below=axis)
     return sheet, axes
 
 
@@ -87,16 +86,13 @@ def keep_turning(finding: Finding, chosen: Samples, scales: Scales) -> Picture |
     calm = chosen.where(steady(chosen, 0.1 * falls))
     if calm.v.size < 200:
         return None
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     edges = speeds(calm, falls) * scales.speed.factor
     for sign, mark, fill in ((1.0, "^", MEASURED), (-1.0, "v", "white")):
         _side(axes, calm.where(calm.v * sign > 0), sign, (mark, fill), edges, scales)
-    axes.set_xlabel(f"speed [{scales.speed.unit}]")
     axes.set_xlim(edges[0], edges[-1])
-    if falls:
-        logarithmic(axes, falls * scales.speed.factor)
-    heading(axes, f"to keep moving [{scales.torque.unit}]")
+    logarithmic(axes, falls * scales.speed.factor)
+    heading(axes, f"to keep moving [{scales.torque.unit}]", below=f"speed [{scales.speed.unit}]")
     caption = "▲ measured forward, ▽ backward, bars 95 %. Dashed: model before; solid: after. Steady motion only."
     caption += f" Dotted: {scales.speed.text(falls)}, over which friction falls." if falls else ""
     return sheet.picture(f"{finding.title}. {caption}", caption)
@@ -123,9 +119,10 @@ def plain_decades(axes: "Axes") -> None:
 
 
 def logarithmic(axes: "Axes", falls: float) -> None:
-    """Make the axis of speed logarithmic, with a mark at the speed over which friction falls."""
-    plain_decades(axes)
-    axes.axvline(falls, color=GREY, lw=1, ls=(0, (1, 2)))
+    """Make the axis of speed logarithmic, with a mark at the speed over which friction falls; nothing where it is 0."""
+    if falls:
+        plain_decades(axes)
+        axes.axvline(falls, color=GREY, lw=1, ls=(0, (1, 2)))
 
 
 def steady(chosen: Samples, least: float) -> Mask:
@@ -136,26 +133,17 @@ def steady(chosen: Samples, least: float) -> Mask:
     step = np.gradient(chosen.t) if chosen.t.size > 2 else np.ones_like(chosen.t)
     with np.errstate(invalid="ignore", divide="ignore"):
         acceleration = np.abs(np.gradient(chosen.v) / step) if chosen.t.size > 2 else np.ones_like(chosen.t)
-    moving = (
-        (np.abs(chosen.v) > (min(least, slow(chosen.v)) or slow(chosen.v))) & np.isfinite(acceleration) & (step > 0)
-    )
+    slowest = min(least, slow(chosen.v)) or slow(chosen.v)
+    moving = (np.abs(chosen.v) > slowest) & np.isfinite(acceleration) & (step > 0)
     limit = np.quantile(acceleration[moving], 0.6) if moving.any() else 0.0
     return moving & (acceleration <= limit)
 
 
 def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges: Array, scales: Scales) -> None:
     speed, unit = np.abs(side.v) * scales.speed.factor, scales.torque.factor * sign
-    style: Style = {
-        "ls": "",
-        "marker": mark[0],
-        "ms": 8,
-        "mfc": mark[1],
-        "color": MEASURED,
-        "elinewidth": 1.4,
-        "zorder": 4,
-    }
+    style: Style = {"ls": "", "marker": mark[0], "ms": 8, "mfc": mark[1], "color": MEASURED, "elinewidth": 1.4}
     measured = over_speed(speed, side.tau * unit, edges)
-    axes.errorbar(measured.x, measured.mean, yerr=measured.half, **style)
+    axes.errorbar(measured.x, measured.mean, yerr=measured.half, zorder=4, **style)
     for error, colour, dashes in ((side.before, BEFORE, (4, 2)), (side.after, AFTER, (None, None))):
         model = over_speed(speed, (side.tau - error) * unit, edges)
         axes.plot(model.x, model.mean, color=colour, dashes=dashes, lw=1.5)
@@ -190,8 +178,7 @@ def rest_and_motion(finding: Finding, chosen: Samples, scales: Scales) -> Pictur
 
 
 def _split(finding: Finding, chosen: Samples, scales: Scales, groups: list[tuple[str, Mask, Any]]) -> Picture | None:
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     x = chosen.q * scales.position.factor
     edges = np.linspace(x.min(), x.max(), 33)
     added = not np.array_equal(chosen.before, chosen.after)
@@ -201,9 +188,8 @@ def _split(finding: Finding, chosen: Samples, scales: Scales, groups: list[tuple
             axes.plot(mean.x, mean.mean, color=colour, ls=style, lw=1.8)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     degrees(axes, scales.position.unit)
-    axes.set_xlabel(f"position [{scales.position.unit}]")
     axes.locator_params(axis="y", nbins=5)
-    heading(axes, f"mean error [{scales.torque.unit}]")
+    heading(axes, f"mean error [{scales.torque.unit}]", below=f"position [{scales.position.unit}]")
     models = "Orange before, blue after." if added else "The refitted model."
     caption = f"{models} Solid: {groups[0][0]}; dotted: {groups[1][0]}."
     return sheet.picture(f"{finding.title}, error over position. {caption}", caption)

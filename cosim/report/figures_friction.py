@@ -110,25 +110,17 @@ def friction(finding: Finding, diagnosis: Diagnosis, chosen: Samples, scales: Sc
     edges = speeds(shown, falls)
     low = edges[0] if edges[0] > 0 else 1e-3 * edges[-1]
     grid = np.geomspace(low, edges[-1], POINTS) if falls else np.linspace(low, edges[-1], POINTS)
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     apart = _drawn(axes, both, grid, scales)
     for sign, mark, fill in ((1.0, "^", MEASURED), (-1.0, "v", "white")):
         _markers(axes, both.after, shown.where(shown.v * sign > 0), sign, (mark, fill), edges, scales)
-    axes.set_xlabel(f"speed [{scales.speed.unit}]")
     axes.set_xlim(edges[0] * scales.speed.factor, edges[-1] * scales.speed.factor)
-    if falls:
-        logarithmic(axes, falls * scales.speed.factor)
-    heading(axes, f"friction [{scales.torque.unit}]")
-    caption = _caption(apart, falls, scales)
-    return sheet.picture(f"{finding.title}. {caption}", caption)
-
-
-def _caption(apart: bool, falls: float, scales: Scales) -> str:
+    logarithmic(axes, falls * scales.speed.factor)
+    heading(axes, f"friction [{scales.torque.unit}]", below=f"speed [{scales.speed.unit}]")
     caption = "▲ measured forward, ▽ backward, other effects taken out, bars 95 %. "
-    caption += "Orange: refitted card; blue: improved card"
-    caption += " (dotted: backward)." if apart else "."
-    return caption + (f" Dotted line: {scales.speed.text(falls)}, over which friction falls." if falls else "")
+    caption += f"Orange: refitted card; blue: improved card{' (dotted: backward)' * apart}."
+    caption += f" Dotted line: {scales.speed.text(falls)}, over which friction falls." if falls else ""
+    return sheet.picture(f"{finding.title}. {caption}", caption)
 
 
 def _drawn(axes: "Axes", both: Curves, grid: Array, scales: Scales) -> bool:

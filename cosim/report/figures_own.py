@@ -72,18 +72,16 @@ def own(finding: Finding, diagnosis: Diagnosis, chosen: Samples, scales: Scales)
     model = side * torque(shown.q, shown.v) * scales.torque.factor
     measured = model + side * shown.after * scales.torque.factor
     x, edges, axis, folds = _places(finding, shown, scales)
-    sheet = blank(finding)
-    axes = sheet.axes()
+    sheet, axes = blank(finding)
     for sign, mark, fill in ((1.0, "^", MEASURED), (-1.0, "v", "white")):
         _markers(axes, x[shown.v * sign > 0], measured[shown.v * sign > 0], edges, (mark, fill))
     line = curve(x, model, edges)
     axes.plot(line.x, line.mean, color=AFTER, lw=1.8, zorder=5)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    axes.set_xlabel(axis)
     axes.locator_params(axis="y", nbins=5)
     if not folds:
         degrees(axes, scales.position.unit)
-    heading(axes, f"{lowered(finding.title)} [{scales.torque.unit}]")
+    heading(axes, f"{lowered(finding.title)} [{scales.torque.unit}]", below=axis)
     caption = f"{folds}▲ measured forward, ▽ backward, other effects taken out, bars 95 %. Line: improved model."
     return sheet.picture(f"{finding.title}, over position. {caption}", caption)
 
@@ -96,12 +94,8 @@ def _places(finding: Finding, shown: Samples, scales: Scales) -> tuple[Array, Ar
         unit = handy(ANGLE if scales.turn != 1.0 else LENGTH, length)
         pitch = length * unit.factor
         axis = f"position within one pitch [{unit.unit}]"
-        return (
-            np.mod(shown.q * unit.factor, pitch),
-            np.linspace(0, pitch, BINS + 1),
-            axis,
-            (f"All recordings folded onto one pitch of {unit.text(length, 3)}. "),
-        )
+        folds = f"All recordings folded onto one pitch of {unit.text(length, 3)}. "
+        return np.mod(shown.q * unit.factor, pitch), np.linspace(0, pitch, BINS + 1), axis, folds
     x = shown.q * scales.position.factor
     return x, np.linspace(x.min(), x.max(), BINS + 1), f"position [{scales.position.unit}]", ""
 

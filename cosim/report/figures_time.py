@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.diagnosis.answer.result import Array, Trace
+from cosim.diagnosis.answer.result import Trace
 from cosim.diagnosis.measure.breakdown import bars
 from cosim.plots.style import AFTER, BAND, BEFORE, GREY, MEASURED, SHADE, Style, thin
 from cosim.report.quantities import Scales
@@ -32,7 +32,8 @@ def recording(index: int, trace: Trace, scales: Scales, most: tuple[float, float
     for axes, values, colour in ((middle, before, BEFORE), (low, after, AFTER)):
         axes.stairs(np.nan_to_num(values) * unit.factor, edges, fill=True, color=colour, lw=0)
         axes.set_ylim(0, most[1] * unit.factor)
-    heading(middle, f"RMS by {_width(edges)}, before and after [{unit.unit}]")
+    width = edges[1] - edges[0]
+    heading(middle, f"RMS by {'the second' if width == 1 else f'{width:g} s'}, before and after [{unit.unit}]")
     _times((top, middle, low), trace)
     _flags(top, trace)
     low.set_xlabel("time [s]")
@@ -56,11 +57,6 @@ def _times(strips: "tuple[Axes, ...]", trace: Trace) -> None:
             axes.axvspan(trace.t[0], trace.t[-1], color=SHADE, lw=0, zorder=-1)
         axes.locator_params(axis="y", nbins=4 if axes is strips[0] else 1)
         axes.tick_params(labelbottom=axes is strips[-1])
-
-
-def _width(edges: Array) -> str:
-    width = edges[1] - edges[0]
-    return "the second" if width == 1 else f"{width:g} s"
 
 
 def _flags(axes: "Axes", trace: Trace) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Array, Region
 from cosim.diagnosis.measure.breakdown import Samples, grid, slow
+from cosim.plots.quantities import labelled
 from cosim.plots.style import AFTER, BEFORE, GREY, LINE, MEASURED, Style
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture, Sheet, degrees, heading
@@ -21,12 +22,13 @@ NAMES = {
     "time": "time",
     "acceleration": "acceleration",
 }
+SIDES = {-1: "backward", 0: "standing", 1: "forward"}
 CELLS = (14, 6)
 
 
 def region(before: Region, after: Region | None, scales: Scales) -> Picture:
     """Draw the mean missing torque over one coordinate, before and after, with bands; hatched = never visited."""
-    sheet = Sheet(f"where-{_plain(before.axis)}", 230)
+    sheet = Sheet(f"where-{''.join(filter(str.isalnum, before.axis)) or 'axis'}", 230)
     axes = sheet.axes()
     name = NAMES.get(before.axis, before.axis)
     if before.axis == "direction":
@@ -51,7 +53,7 @@ def _along(axes: "Axes", before: Region, after: Region | None, scales: Scales, n
         axes.plot(side.centres * unit.factor, mean, color=colour, dashes=style)
     unseen = never(axes, x, np.isfinite(before.mean))
     degrees(axes, unit.unit)
-    axes.set_xlabel(f"{name} [{unit.unit}]" if unit.unit else name)
+    axes.set_xlabel(labelled(name, unit.unit))
     return "Mean with its 95 % band." + (" Hatched: the machine never went there." if unseen else "")
 
 
@@ -78,70 +80,54 @@ def _sides(axes: "Axes", before: Region, after: Region | None, scales: Scales) -
         if side is None:
             continue
         fill = "white" if mark == "s" else colour
-        style: Style = {
-            "ms": 8,
-            "mfc": fill,
-            "mec": colour,
-            "ecolor": colour,
-            "elinewidth": 1.6,
-            "lw": 0,
-            "mew": 1.8,
-        }
+        style: Style = {"ms": 8, "mfc": fill, "mec": colour, "ecolor": colour, "elinewidth": 1.6, "lw": 0, "mew": 1.8}
         place = np.arange(len(side.mean)) + shift
         axes.errorbar(place, side.mean * factor, yerr=side.band * factor, marker=mark, **style)
-    axes.set_xticks(range(len(before.centres)), [_direction(value) for value in before.centres])
+    axes.set_xticks(range(len(before.centres)), [SIDES[int(np.sign(value))] for value in before.centres])
     axes.set_xlim(-0.6, len(before.centres) - 0.4)
-
-
-def _direction(value: float) -> str:
-    return "backward" if value < 0 else "forward" if value > 0 else "standing"
 
 
 def plane(name: str, chosen: Samples, residual: Array, scales: Scales, most: float | None = None) -> Picture:
     """Draw the signed mean error over angle and speed, + and - printed, hatched where the machine never went."""
     before = name == "before"
-    q = np.linspace(float(chosen.q.min()), float(chosen.q.max()) + 1e-12, CELLS[0] + 1)
-    v = np.linspace(slow(chosen.v), float(np.quantile(np.abs(chosen.v), 0.999)) + 1e-12, CELLS[1] + 1)
-    mean = grid(chosen, residual, q, v)
+    q, v, mean = _gridded(chosen, residual)
     sheet = Sheet(f"plane-{name}", 220, plate=True)
     axes = sheet.axes()
     top = most or float(np.nanmax(np.abs(mean)))
-    _cells(axes, mean, q * scales.position.factor, v * scales.speed.factor, top, BEFORE if before else AFTER)
-    axes.grid(visible=False)
+    colour = BEFORE if before else AFTER
+    cells(axes, mean / top, q * scales.position.factor, v * scales.speed.factor, colour, 0.2)
     degrees(axes, scales.position.unit)
-    axes.set_xlabel(f"position [{scales.position.unit}]")
-    heading(axes, f"speed [{scales.speed.unit}]")
-    caption = f"Mean error, marked + and −; darkest {scales.torque.text(top)}. {_never(mean)}".strip()
+    heading(axes, f"speed [{scales.speed.unit}]", below=f"position [{scales.position.unit}]")
+    never = "Hatched: never visited." if np.isnan(mean).any() else ""
+    caption = f"Mean error, marked + and −; darkest {scales.torque.text(top)}. {never}".strip()
     title = "Before, over position and speed" if before else "After, over position and speed"
     return sheet.picture(f"{title}. {caption}", caption, title)
 
 
-def _never(mean: Array) -> str:
-    return "Hatched: never visited." if np.isnan(mean).any() else ""
+def _gridded(chosen: Samples, residual: Array) -> tuple[Array, Array, Array]:
+    """Edges of cells of position and speed, and the mean in each."""
+    q = np.linspace(float(chosen.q.min()), float(chosen.q.max()) + 1e-12, CELLS[0] + 1)
+    v = np.linspace(slow(chosen.v), float(np.quantile(np.abs(chosen.v), 0.999)) + 1e-12, CELLS[1] + 1)
+    return q, v, grid(chosen, residual, q, v)
 
 
 def strongest(chosen: Samples) -> float:
     """Return the largest mean error of the grid before, the common scale of both grids."""
-    q = np.linspace(float(chosen.q.min()), float(chosen.q.max()) + 1e-12, CELLS[0] + 1)
-    v = np.linspace(slow(chosen.v), float(np.quantile(np.abs(chosen.v), 0.999)) + 1e-12, CELLS[1] + 1)
-    mean = grid(chosen, chosen.before, q, v)
+    *_, mean = _gridded(chosen, chosen.before)
     return float(np.nanmax(np.abs(mean))) if np.isfinite(mean).any() else 0.0
 
 
-def _cells(axes: "Axes", mean: Array, q: Array, v: Array, top: float, colour: str) -> None:
+def cells(axes: "Axes", mean: Array, x: Array, y: Array, colour: str, loud: float) -> None:
+    """Draw cells between edges, as dark as their mean is of 1, with its sign from `loud` on, hatched where none is."""
     from matplotlib.colors import LinearSegmentedColormap
 
     ramp = LinearSegmentedColormap.from_list("ramp", ["white", colour])
-    axes.axhspan(v[0], v[-1], fc="white", ec=LINE, hatch="////", lw=0, zorder=0)
-    shade = np.ma.masked_invalid(np.abs(mean) / top * 0.92)
-    axes.pcolormesh(q, v, shade, cmap=ramp, vmin=0, vmax=1, ec="white", lw=1)
-    marks = np.argwhere(np.abs(np.nan_to_num(mean)) > 0.2 * top)
-    for row, column in marks:
-        at = 0.5 * (q[column] + q[column + 1]), 0.5 * (v[row] + v[row + 1])
+    axes.axhspan(y[0], y[-1], fc="white", ec=LINE, hatch="////", lw=0, zorder=0)
+    shade = np.ma.masked_invalid(np.abs(mean) * 0.92)
+    axes.pcolormesh(x, y, shade, cmap=ramp, vmin=0, vmax=1, ec="white", lw=1)
+    for row, column in np.argwhere(np.abs(np.nan_to_num(mean)) > loud):
+        at = 0.5 * (x[column] + x[column + 1]), 0.5 * (y[row] + y[row + 1])
         dark = shade[row, column] > 0.55
         sign = "+" if mean[row, column] > 0 else "−"
         axes.annotate(sign, at, (0, -4), textcoords="offset points", ha="center", color="white" if dark else MEASURED)
-
-
-def _plain(text: str) -> str:
-    return "".join(letter for letter in text if letter.isalnum()) or "axis"
+    axes.grid(visible=False)

@@ -11,7 +11,6 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, Trace, is_special
 from cosim.diagnosis.measure.findings import without_model
-from cosim.plots.quantities import Scale
 from cosim.report import tables, words
 from cosim.report.lead import led
 from cosim.report.next_experiment import is_about, to_record
@@ -65,12 +64,14 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
         said = [f"In the training runs alone: {words.lowered(text)}" for text in said if text]
     if one.answer == "ambiguous":
         said = [*words.either(said), _in_model(diagnosis, *one.findings)]
-    rows = [("Where", where(first, scales)), ("How to distinguish", _apart(one))]
+    apart = (finding.told_apart_by for finding in one.findings)  # of possible causes another's would say the same
+    rows = [("Where", where(first, scales)), ("How to distinguish", next(filter(None, apart), ""))]
     rows += [("Ruled out", _plainly(first.ruled_out)), ("Less likely", _plainly(first.less_likely))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)
     checks, repair = _at_the_machine(first, diagnosis)
-    texts = do(one, diagnosis), _likely(first), *words.sized(first)
+    likely = f"probability {first.probability:.2f}" if first.answer in ("found", "ambiguous") else ""
+    texts = do(one, diagnosis), likely, *words.sized(first)
     return Shown(one, tuple(filter(None, said)), filled, closed, checks, repair, picture, *texts)
 
 
@@ -79,10 +80,6 @@ def _at_the_machine(finding: Finding, diagnosis: Diagnosis) -> tuple[tuple[Check
     known = repairs_of(finding.effect) if finding.answer in ("found", "ambiguous") else None
     rows = known.of(diagnosis.motion, words.machine(diagnosis)) if known else {}
     return known.checks if known else (), tables.Table(("Machine", "Repair"), tuple(rows.items()))
-
-
-def _likely(first: Finding) -> str:
-    return f"probability {first.probability:.2f}" if first.answer in ("found", "ambiguous") else ""
 
 
 def _in_model(diagnosis: Diagnosis, first: Finding, *rivals: Finding) -> str:
@@ -114,11 +111,6 @@ def where(finding: Finding, scales: Scales) -> str:
     described = re.sub(r"^around [-−\d.e+]+$", "around one place", finding.where.description)
     named = f" ({', '.join(spans)})" if spans and described else ", ".join(spans)
     return described + named
-
-
-def _apart(one: words.Block) -> str:
-    """What tells the first from its rivals; of possible causes each other's sentence would say the same."""
-    return next((finding.told_apart_by for finding in one.findings if finding.told_apart_by), "")
 
 
 def _plainly(rivals: tuple[str, ...]) -> str:
@@ -175,16 +167,17 @@ def untrained(diagnosis: Diagnosis, scales: Scales) -> str:
     if not trained or not held:
         return ""
     left = _stacked(held, "tau") - _stacked(held, "after")
+    axes = {"q": ("positions", scales.position), "v": ("speeds", scales.speed), "tau": ("torques", scales.torque)}
     told = [
         (*_beyond(_stacked(held, axis), left, _edges(trained, axis)), name, _edges(trained, axis), unit)
-        for axis, name, unit in (
-            ("q", "positions", scales.position),
-            ("v", "speeds", scales.speed),
-            ("tau", "torques", scales.torque),
-        )
+        for axis, (name, unit) in axes.items()
     ]
     energy, rows, name, edges, unit = max(told, key=lambda one: one[0])
-    return _sentence(energy, rows, name, edges, unit) if energy >= MOST and energy >= DENSER * rows else ""
+    if energy < max(MOST, DENSER * rows):
+        return ""
+    where = f"at {name} outside {unit.span(*edges)}, which the fit never had ({100 * rows:.0f} % of the time)"
+    part = f"{100 * energy:.0f} % of the error energy on validation runs"
+    return f"{part} lies {where}: what acts there alone cannot be named without training data."
 
 
 def _stacked(traces: list[Trace], axis: str) -> Array:
@@ -200,9 +193,3 @@ def _beyond(values: Array, left: Array, edges: tuple[float, float]) -> tuple[flo
     """Shares of the energy and of the rows outside the edges."""
     outside, whole = (values < edges[0]) | (values > edges[1]), float(np.nansum(left**2))
     return (float(np.nansum(left[outside] ** 2)) / whole if whole else 0.0), float(np.mean(outside))
-
-
-def _sentence(energy: float, rows: float, name: str, edges: tuple[float, float], unit: Scale) -> str:
-    where = f"at {name} outside {unit.span(*edges)}, which the fit never had ({100 * rows:.0f} % of the time)"
-    part = f"{100 * energy:.0f} % of the error energy on validation runs"
-    return f"{part} lies {where}: what acts there alone cannot be named without training data."

@@ -17,9 +17,11 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
         case "withheld":
             return "Check the recordings first: no effect can be named"
         case "unknown":
-            return _beside_unknown(diagnosis, model) if _named(diagnosis) else _unknown_heading(diagnosis)
+            named = any(name != "unknown" for name in diagnosis.verdict)  # an effect, be it one of several rivals
+            return _beside_unknown(diagnosis, model) if named else _unknown_heading(diagnosis)
         case "none":
-            return f"Nothing missing that {_these(diagnosis)} can show"
+            these = "this recording" if len(diagnosis.traces) == 1 else "these recordings"
+            return f"Nothing missing that {these} can show"
     return _open(diagnosis, model)
 
 
@@ -40,11 +42,6 @@ def _beside_unknown(diagnosis: Diagnosis, model: str) -> str:
     """Say first what the verdict has first: what has no name, where the names may be no more than imitations of it."""
     said = _open(diagnosis, model)
     return f"{_REST.capitalize()}; {lowered(said)}" if diagnosis.verdict[0] == "unknown" else f"{said}; {_REST}"
-
-
-def _named(diagnosis: Diagnosis) -> bool:
-    """Whether the verdict names an effect, be it one of several rivals."""
-    return any(name != "unknown" for name in diagnosis.verdict)
 
 
 def _open(diagnosis: Diagnosis, model: str) -> str:
@@ -95,10 +92,6 @@ def _ambiguous(diagnosis: Diagnosis) -> list[Block]:
     return [block for block in blocks(diagnosis) if block.answer == "ambiguous"]
 
 
-def _these(diagnosis: Diagnosis) -> str:
-    return "this recording" if len(diagnosis.traces) == 1 else "these recordings"
-
-
 def lead(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Return one or two plain sentences below the heading; sizes, doubts and rivals stand in the table of findings."""
     return [sentence for sentence in _LEADS[verdict(diagnosis)](diagnosis, scales) if sentence]
@@ -106,7 +99,9 @@ def lead(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 def _detected(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     found = [block for block in blocks(diagnosis) if block.answer == "found"]
-    said = _stated(found[0]) if len(found) == 1 else f"The model lacks {_listed(found)}."
+    said = f"The model lacks {_listed(found)}."
+    if len(found) == 1:
+        said = stated(found[0].first) or f"{found[0].title} acts on the machine."
     if more := _either(diagnosis, "a further error"):
         said = f"{said.removesuffix('.')}; {more}"
     return [said, improvement(diagnosis, scales)]
@@ -139,18 +134,11 @@ def _either(diagnosis: Diagnosis, subject: str) -> str:
 def _causes(block: Block, diagnosis: Diagnosis) -> str:
     causes = " or ".join(lowered(rival.title) for rival in block.findings)
     if len(block.findings) == 1:
-        unlikely = block.first.probability < LIKELY
-        return f"may come from {causes} ({_probability(block) if unlikely else 'not certain'})"
+        probability = block.first.probability
+        doubt = f"its probability is {probability:.2f}" if probability < LIKELY else "not certain"
+        return f"may come from {causes} ({doubt})"
     held = ", of which the first is in the improved model" if block.first in diagnosis.in_model else ""
     return f"has {count(len(block.findings)).lower()} possible causes: {causes}{held}"
-
-
-def _stated(block: Block) -> str:
-    return stated(block.first) or f"{block.title} acts on the machine."
-
-
-def _probability(block: Block) -> str:
-    return f"its probability is {block.first.probability:.2f}"
 
 
 def _written(diagnosis: Diagnosis) -> str:
@@ -187,7 +175,9 @@ def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
     subject = f"With {_listed(found)} an error remains that" if found else "The error is one that"
     none = f"{subject} none of the {len(others)} {'other ' if found else ''}known effects tested here explains."
-    numbers = improvement(diagnosis, scales) if diagnosis.learned else _numbers(diagnosis, scales)
+    held, unit = diagnosis.heldout, scales.torque
+    numbers = f"The validation error is {unit.text(held.after_rms)}, the noise floor {unit.text(held.floor_rms)}."
+    numbers = improvement(diagnosis, scales) if diagnosis.learned else numbers
     return [own if own and not found else none, numbers.removesuffix(".") + _written(diagnosis) + "."]
 
 
@@ -197,11 +187,6 @@ def _withheld(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 
 _LEADS = {"withheld": _withheld, "found": _detected, "either": _rival, "none": _nothing, "unknown": _unknown}
-
-
-def _numbers(diagnosis: Diagnosis, scales: Scales) -> str:
-    held, unit = diagnosis.heldout, scales.torque
-    return f"The validation error is {unit.text(held.after_rms)}, the noise floor {unit.text(held.floor_rms)}."
 
 
 def improvement(diagnosis: Diagnosis, scales: Scales) -> str:

@@ -1,6 +1,6 @@
 """What has no name: what was learned of it, or why nothing was; each table with what recordings say beside it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from cosim.diagnosis.answer.entries import FormulaEntry, TableEntry
 from cosim.diagnosis.answer.result import Array, Diagnosis
-from cosim.plots.quantities import Scale, decimals, joined, minus, raised
-from cosim.plots.style import AFTER, GREY, LINE, MEASURED, Style
+from cosim.plots.quantities import Scale, decimals, joined, labelled, minus, raised
+from cosim.plots.style import AFTER, GREY, MEASURED, Style
+from cosim.report.figures_where import cells
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture, Sheet, heading
 
@@ -33,17 +34,14 @@ def nameless(diagnosis: Diagnosis, scales: Scales) -> Nameless | None:
     if diagnosis.learned:
         tables = diagnosis.learned["table"]
         pictures = (_picture(k, table, scales) for k, table in enumerate(tables) if table.get("data"))
-        return Nameless((_what(diagnosis),), tuple(_rows(diagnosis, scales)), tuple(pictures))
+        quantities = " and on ".join(diagnosis.learned["quantities"])
+        what = (
+            f"The rest depends on {quantities}. What makes it is not known, so it is modelled as a table learned from "
+            "the training recordings: part of the improved model, and constant beyond the range of these recordings."
+        )
+        return Nameless((what,), tuple(_rows(diagnosis, scales)), tuple(pictures))
     said = diagnosis.not_learned.get("statement", "")
     return Nameless((str(said),)) if said else None
-
-
-def _what(diagnosis: Diagnosis) -> str:
-    quantities = " and on ".join(diagnosis.learned["quantities"])
-    return (
-        f"The rest depends on {quantities}. What makes it is not known, so it is modelled as a table learned from the "
-        "training recordings: part of the improved model, and constant beyond the range of these recordings."
-    )
 
 
 def _rows(diagnosis: Diagnosis, scales: Scales) -> Iterator[tuple[str, str]]:
@@ -87,23 +85,17 @@ def _curve(axes: "Axes", table: TableEntry, scales: Scales) -> str:
     at, value, band = (_numbers(one) for one in (data["at"], data["value"], data["band"]))
     style: Style = {"ls": "", "marker": "o", "ms": 4, "color": MEASURED, "elinewidth": 1}
     axes.errorbar(at * unit.factor, value * shown.factor, yerr=band * shown.factor * np.isfinite(value), **style)
-    x, y = _line(table, at)
+    known = len(where := table.get("at") or table.get("command") or ()) > 0
+    x, y = (np.array(where), np.array(table.get("value") or table["missing"])) if known else (at, at)
     axes.plot(x * unit.factor, y * shown.factor, color=AFTER, lw=2)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     axes.locator_params(axis="y", nbins=5)
-    axes.set_xlabel(_labelled(str(table.get("over", "command" if "command" in table else "what the term says")), unit))
-    heading(axes, _labelled(table["kind"] if table["kind"] != "drive" else "not delivered", shown))
-    line = "the table" if len(_where(table)) else "as the term says"
+    axes.set_xlabel(
+        labelled(str(table.get("over", "command" if "command" in table else "what the term says")), unit.unit)
+    )
+    heading(axes, labelled(table["kind"] if table["kind"] != "drive" else "not delivered", shown.unit))
+    line = "the table" if known else "as the term says"
     return f"Dots: mean of what training recordings leave without it, 95 % bars. Line: {line}."
-
-
-def _where(table: TableEntry) -> Sequence[float]:
-    return table.get("at") or table.get("command") or ()
-
-
-def _line(table: TableEntry, at: Array) -> tuple[Array, Array]:
-    where = _where(table)
-    return (np.array(where), np.array(table.get("value") or table["missing"])) if len(where) else (at, at)
 
 
 def _maps(sheet: Sheet, table: TableEntry, scales: Scales) -> str:
@@ -115,35 +107,19 @@ def _maps(sheet: Sheet, table: TableEntry, scales: Scales) -> str:
     top = float(np.nanmax(np.abs(np.concatenate([model.ravel(), seen.ravel()])))) or 1.0
     for place, (grid, said) in enumerate(((model, "table"), (seen, "data"))):
         axes = sheet.axes(left=44 + 156 * place, right=10 + 156 * (1 - place))
-        _map(axes, grid.T / top, at * unit.factor, by)
-        axes.set_xlabel(_labelled(str(table["over"]), unit))
+        cells(axes, grid.T / top, _edges(at * unit.factor), _edges(by), AFTER, 0.3)
+        axes.locator_params(axis="x", nbins=4)
+        axes.set_xlabel(labelled(str(table["over"]), unit.unit))
         axes.annotate(said, (1, 1), (0, 12), xycoords="axes fraction", textcoords="offset points", ha="right")
         if place:
             axes.set_yticklabels([])
         else:
-            heading(axes, _labelled(str(table["by"]), _unit_of(str(table["by"]), scales)))
-    shown = _value_unit(table, scales)
+            heading(axes, labelled(str(table["by"]), _unit_of(str(table["by"]), scales).unit))
+    darkest = _value_unit(table, scales).text(top)
     return (
         f"Left the table, right the mean of what training recordings leave without it; marked + and −, "
-        f"darkest {shown.text(top)}. Hatched: never visited."
+        f"darkest {darkest}. Hatched: never visited."
     )
-
-
-def _map(axes: "Axes", grid: Array, x: Array, y: Array) -> None:
-    from matplotlib.colors import LinearSegmentedColormap
-
-    ramp = LinearSegmentedColormap.from_list("ramp", ["white", AFTER])
-    edges = _edges(x), _edges(y)
-    axes.axhspan(edges[1][0], edges[1][-1], fc="white", ec=LINE, hatch="////", lw=0, zorder=0)
-    shade = np.ma.masked_invalid(np.abs(grid) * 0.92)
-    axes.pcolormesh(*edges, shade, cmap=ramp, vmin=0, vmax=1, ec="white", lw=1)
-    for row, column in np.argwhere(np.abs(np.nan_to_num(grid)) > 0.3):
-        ink = "white" if shade[row, column] > 0.55 else MEASURED
-        sign = "+" if grid[row, column] > 0 else "−"
-        style: Style = {"ha": "center", "color": ink}
-        axes.annotate(sign, (x[column], y[row]), (0, -4), textcoords="offset points", **style)
-    axes.grid(visible=False)
-    axes.locator_params(axis="x", nbins=4)
 
 
 def _looked_up(table: TableEntry, at: Array, by: Array) -> Array:
@@ -174,7 +150,3 @@ def _unit_of(over: str, scales: Scales) -> Scale:
     known = {"position": scales.position, "speed": scales.speed, "position over the turn": Scale(180 / np.pi, "°")}
     known |= {"temperature": Scale(1.0, "°C"), "": scales.torque}
     return known.get(over, Scale(1.0, ""))
-
-
-def _labelled(name: str, unit: Scale) -> str:
-    return f"{name} [{unit.unit}]" if unit.unit else name

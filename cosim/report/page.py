@@ -9,7 +9,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.breakdown import Samples, bars, samples, worst
-from cosim.plots.explorer import Sheet, record, script_of_page
+from cosim.plots.explorer import Sheet, of_page, record, script_of_page
 from cosim.plots.quantities import joined
 from cosim.report import tables, unknown, words
 from cosim.report.figures_dynamic import effect
@@ -113,11 +113,9 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
     if not files:
         return None
     proven = words.proven_range(diagnosis, scales)
-    text = (
-        f"is proven {proven}. Outside this range it is not validated: use the original model there."
-        if proven
-        else "is proven on the validation runs only."
-    )
+    text = "is proven on the validation runs only."
+    if proven:
+        text = f"is proven {proven}. Outside this range it is not validated: use the original model there."
     said = [f"in front of {words.model(diagnosis)}"] if "correction" in diagnosis.improved else []
     said += [text, f"It is worse here: {', '.join(worse)}." if worse else ""]
     if "ssp" in diagnosis.improved:
@@ -207,13 +205,10 @@ def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, ob
     """Return when, and the worst seconds."""
     traces = sorted((t for t in diagnosis.traces if t.t.size > 1), key=lambda trace: not trace.heldout)
     shown, hidden = traces[:MOST_RECORDINGS], traces[MOST_RECORDINGS:]
-    most = (
-        max((_most(trace)[0] for trace in shown), default=1.0),
-        max((_most(trace)[1] for trace in shown), default=1.0),
-    )
+    missing, error = map(max, zip(*map(_most, shown), strict=True))
     span = worst(traces[0], traces[0].tau - traces[0].after)
     return {
-        "times": [recording(place, trace, scales, most) for place, trace in enumerate(shown)],
+        "times": [recording(place, trace, scales, (missing, error)) for place, trace in enumerate(shown)],
         "hidden": f"{len(hidden)} more recordings are in the explorer below." if hidden else "",
         "overlay": overlay(traces[0], span, scales, WIDE),
         "overlay_small": overlay(traces[0], span, scales),
@@ -232,10 +227,8 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, obj
     made, here = diagnosis.provenance, resources("cosim.report")
     script, digest = script_of_page()
     told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
-    told += [
-        f"seed {made['seed']}" if "seed" in made else "",
-        f"{diagnosis.seconds:.1f} s" if diagnosis.seconds else "",
-    ]
+    told += [f"seed {made['seed']}"] if "seed" in made else []
+    told += [f"{diagnosis.seconds:.1f} s"] if diagnosis.seconds else []
     return {
         "parameters": tables.parameters(diagnosis),
         "parameters_sentence": " ".join(_refitted(diagnosis)),
@@ -275,13 +268,10 @@ def payload(diagnosis: Diagnosis, scales: Scales) -> JsonObject:
         Sheet(f"error: measured minus model [{torque}]", 0.32, errors),
         Sheet(f"position [{scales.position.unit}]", 0.23, [("q", "ink", ())]),
     )
-    return {
-        "sheets": [sheet.as_json() for sheet in sheets],
-        "differences": [["lost", "tau", "before"], ["left", "tau", "after"]],
-        "recordings": [_packed(trace, scales, seconds) for trace in traces],
-        "first": "after",
-        "open": next((i for i, trace in enumerate(traces) if trace.heldout), 0),
-    }
+    records = [_packed(trace, scales, seconds) for trace in traces]
+    differences = [["lost", "tau", "before"], ["left", "tau", "after"]]
+    shown = next((i for i, trace in enumerate(traces) if trace.heldout), 0)
+    return of_page(sheets, records, "after", differences=differences, open=shown)
 
 
 def _packed(trace: Trace, scales: Scales, seconds: float) -> JsonObject:

@@ -67,8 +67,13 @@ class Sheet:
         return Markup(head + (body if self.plate else inked(body)))
 
 
-def heading(axes: "Axes", text: str) -> None:
-    """Write the quantity of the vertical axis above it, where it can be read without turning the head."""
+def heading(axes: "Axes", text: str, below: str = "") -> None:
+    """Write the quantity of the vertical axis above it, where it can be read without turning the head.
+
+    `below` is that of the other axis.
+    """
+    if below:
+        axes.set_xlabel(below)
     axes.annotate(text, (0, 1), (-34, 12), xycoords="axes fraction", textcoords="offset points", color=GREY)
 
 

@@ -12,7 +12,7 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, Part, Trace
 from cosim.diagnosis.measure.breakdown import bars
 from cosim.plots.quantities import decimals, number, raised, scale_of
 from cosim.report.quantities import Scales
-from cosim.report.words import ANSWERS, limit, lowered, shows_from, sized, started, unseen_torque
+from cosim.report.words import ABSENT, ANSWERS, limit, lowered, others, shows_from, sized, started, unseen_torque
 from pyfmi_models.assembly import LINEAR_UNITS, Axis
 from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.friction import LAWS
@@ -55,12 +55,9 @@ def limits(diagnosis: Diagnosis, scales: Scales) -> Table:
     for answer in ("not_seen", "not_decided", "not_testable"):
         for finding in (one for one in diagnosis.findings if one.answer == answer):
             groups.setdefault((answer, _from(finding, least)), []).append(finding)
-    rows = [(_titles(group), ANSWERS[answer], said) for (answer, said), group in groups.items()]
+    titles = {key: [lowered(finding.title) for finding in group] for key, group in groups.items()}
+    rows = [(", ".join([groups[key][0].title, *titles[key][1:]]), ANSWERS[key[0]], key[1]) for key in groups]
     return Table(("Effect", "Answer", "Would have shown from"), tuple(rows), (), "stack named limits")
-
-
-def _titles(group: Sequence[Finding]) -> str:
-    return ", ".join([group[0].title, *(lowered(finding.title) for finding in group[1:])])
 
 
 def numbers(finding: Finding) -> Table:
@@ -110,9 +107,8 @@ def proof(diagnosis: Diagnosis, scales: Scales) -> Table:
     if held.position:
         unit = scale_of("rad" if diagnosis.motion == "rotary" else "m", max(map(abs, held.position.values())))
         rows.append((f"Position, closed loop [{unit.unit}]", *_cells(held.position, names, unit.factor)))
-    return Table(
-        ("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise"), tuple(rows), (1, 2, 3, 4)
-    )
+    named = ("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise")
+    return Table(named, tuple(rows), (1, 2, 3, 4))
 
 
 def _cells(found: dict[str, float], names: tuple[str, ...], factor: float) -> tuple[str, ...]:
@@ -173,16 +169,9 @@ def files(diagnosis: Diagnosis) -> Table:
 
 def unseen(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return one line on what was not detected and what these recordings cannot show, and the names that it folds."""
-    words = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
-    named = {answer: [lowered(f.title) for f in diagnosis.findings if f.answer == answer] for answer in words}
-    counts = [f"{len(names)} {words[answer]}" for answer, names in named.items() if names]
-    if not counts:
-        return "", ""
-    many, _, first = counts[0].partition(" ")
-    head = f"{many} other effect{'' if many == '1' else 's'}: {first}"
-    head += ", limits in the table below" if named["not_seen"] else ""
-    sentences = [f"{started(words[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
-    return "; ".join([head, *counts[1:]]), " ".join(sentences)
+    named = {answer: [lowered(f.title) for f in diagnosis.findings if f.answer == answer] for answer in ABSENT}
+    sentences = [f"{started(ABSENT[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
+    return others(diagnosis, ", limits in the table below" * bool(named["not_seen"])), " ".join(sentences)
 
 
 def equation(effect: str) -> str:

@@ -7,31 +7,16 @@ from pathlib import Path
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.decide.calibration import LIKELY
 from cosim.plots.quantities import spelled
+from cosim.report import words
 from cosim.report.findings import do, untrained, where
 from cosim.report.lead import heading, in_motion
 from cosim.report.next_experiment import to_record
 from cosim.report.quantities import Scales
-from cosim.report.words import (
-    ANSWERS,
-    Block,
-    blocks,
-    delivered,
-    doubts,
-    law,
-    left_out,
-    lowered,
-    model,
-    proven_range,
-    sized,
-)
+from cosim.report.words import Block, delivered, lowered
 
 WIDTH = 80
 REPORT = "report.html"
-WORDS = {
-    "found": ANSWERS["found"].lower(),
-    "ambiguous": ANSWERS["ambiguous"].lower(),
-    "not_proven": ANSWERS["not_proven"].lower(),
-}
+WORDS = {answer: words.ANSWERS[answer].lower() for answer in ("found", "ambiguous", "not_proven")}
 NAME, SIZE, RANGE = 21, 12, 16
 REMARKS = 3
 """Remarks on recordings and card that the terminal prints."""
@@ -47,21 +32,22 @@ def summary(diagnosis: Diagnosis, out: Path | None = None) -> str:
         out: folder of its files, where they were written.
     """
     scales = Scales.of(diagnosis)
-    title = printable(_title(diagnosis))
+    title, goes = printable(_title(diagnosis)), ", ".join(diagnosis.depends_on)
+    limits = "the report" if REPORT in diagnosis.files else "diagnosis.json"
     parts = [
         textwrap.wrap(title, WIDTH),
         _doubts(diagnosis),
-        [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
+        [line for block in words.blocks(diagnosis) for line in _to_do(block, diagnosis)],
         _files(diagnosis, scales, out),
         [""],
-        [line for block in blocks(diagnosis) for line in _block(block, scales)],
+        [line for block in words.blocks(diagnosis) for line in _block(block, scales)],
         _wrapped(diagnosis.broadband.get("statement", ""), 2),
-        _goes_with(diagnosis),
+        _wrapped(f"The remaining error correlates with: {goes}" if goes else "", 2),
         _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
-        _rest(diagnosis),
+        _wrapped(words.others(diagnosis, f", limits in {limits}"), 2),
         _wrapped(spelled(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", "")), 0),
         _formulas(diagnosis),
-        _wrapped(law(diagnosis), 0),
+        _wrapped(words.law(diagnosis), 0),
         _error(diagnosis, scales),
         _remarks(diagnosis, out),
         _next(diagnosis),
@@ -72,14 +58,14 @@ def summary(diagnosis: Diagnosis, out: Path | None = None) -> str:
 
 def _doubts(diagnosis: Diagnosis) -> list[str]:
     """Return what to read before the answer, what keeps effects from being named first."""
-    alarms, others, _ = doubts(diagnosis)
+    alarms, others, _ = words.doubts(diagnosis)
     marked = [("Careful", text) for text in alarms] + [("Note", text) for text in others]
     return [line for word, text in marked for line in _ordered(word, text)]
 
 
 def _remarks(diagnosis: Diagnosis, out: Path | None) -> list[str]:
     """Return the first remarks on recordings and card; where there is a report, it holds the others."""
-    remarks = doubts(diagnosis)[2]
+    remarks = words.doubts(diagnosis)[2]
     shown = remarks[:REMARKS] if out and REPORT in diagnosis.files else remarks
     rest = len(remarks) - len(shown)
     more = [f"{rest} more remark{'s' if rest > 1 else ''} in {REPORT}"] if rest else []
@@ -101,13 +87,13 @@ def _to_do(block: Block, diagnosis: Diagnosis) -> list[str]:
 def _files(diagnosis: Diagnosis, scales: Scales, out: Path | None) -> list[str]:
     """Return which file to open, and which model to use where."""
     lines = _ordered("Open", str(out / REPORT)) if out and REPORT in diagnosis.files else []
-    proven, files = proven_range(diagnosis, scales), delivered(diagnosis)
+    proven, files = words.proven_range(diagnosis, scales), delivered(diagnosis)
     suffix = f" (proven {proven})" if proven else ""
     return lines + (_ordered("Use", files[0] + suffix) if files else [])
 
 
 def _title(diagnosis: Diagnosis) -> str:
-    card = model(diagnosis) or diagnosis.mount
+    card = words.model(diagnosis) or diagnosis.mount
     title = heading(diagnosis, card)
     return title if card in title else f"{title} ({card})"
 
@@ -118,17 +104,14 @@ def _block(block: Block, scales: Scales) -> list[str]:
         return _row(WORDS.get(block.answer, block.answer), block.first, scales)
     is_likely = sum(one.probability for one in block.findings) >= LIKELY
     first = _row("either" if is_likely else WORDS["ambiguous"], block.first, scales)
-    return first + [line for rival in block.findings[1:] for line in _wrapped(_rival(rival), 12)]
-
-
-def _rival(finding: Finding) -> str:
-    return f"or {lowered(finding.title)}, probability {finding.probability:.2f}"
+    others = (f"or {lowered(one.title)}, probability {one.probability:.2f}" for one in block.findings[1:])
+    return first + [line for text in others for line in _wrapped(text, 12)]
 
 
 def _row(word: str, finding: Finding, scales: Scales) -> list[str]:
     """Return answer, name and size with its range of a finding, and below it probability and place."""
     told = f"probability {finding.probability:.2f}" if finding.answer in ("found", "ambiguous") else ""
-    size, size_range = sized(finding)
+    size, size_range = words.sized(finding)
     columns = f"  {word:<9} {lowered(finding.title):<{NAME}} {size:<{SIZE}} {size_range:<{RANGE}}"
     first = textwrap.wrap(printable(columns.rstrip()), WIDTH, subsequent_indent=" " * 12) or [""]
     return first + _wrapped(", ".join(text for text in (told, where(finding, scales)) if text), 12)
@@ -139,23 +122,12 @@ def _wrapped(text: str, indent: int) -> list[str]:
     return textwrap.wrap(printable(text), WIDTH, initial_indent=margin, subsequent_indent=margin)
 
 
-def _goes_with(diagnosis: Diagnosis) -> list[str]:
-    """Return on what an unknown rest depends."""
-    return (
-        _wrapped(f"The remaining error correlates with: {', '.join(diagnosis.depends_on)}", 2)
-        if diagnosis.depends_on
-        else []
-    )
-
-
 def _formulas(diagnosis: Diagnosis) -> list[str]:
     """Return each closed form that is as good on unseen recordings as what was learned, with its numbers."""
     lines = []
     for one in diagnosis.learned.get("formula", ()):
-        numbers = ", ".join(
-            f"{name} {told['value']:.3g}{'' if told['unit'] == '1' else ' ' + told['unit']}"
-            for name, told in one["parameters"].items()
-        )
+        told = {name: f"{number['value']:.3g} {number['unit']}" for name, number in one["parameters"].items()}
+        numbers = ", ".join(f"{name} {text.removesuffix(' 1')}" for name, text in told.items())
         lines += _wrapped(f"As good, and shorter: {one['equation']}; {numbers}", 0)
     return lines
 
@@ -169,20 +141,6 @@ def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
     unknown = "unknown" in diagnosis.verdict
     reason = "nothing was learned outside the catalogue" if unknown else "nothing is left outside the catalogue"
     return f"Nothing to propose: {reason}."
-
-
-def _rest(diagnosis: Diagnosis) -> list[str]:
-    """Return how many other effects were not detected, how many could not be tested, and where their limits are."""
-    answers = [one.answer for one in diagnosis.findings]
-    told = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
-    counts = [(sum(one == answer for one in answers), words) for answer, words in told.items()]
-    said = [f"{number} {words}" for number, words in counts if number]
-    where_ = "the report" if REPORT in diagnosis.files else "diagnosis.json"
-    if not said:
-        return []
-    many, _, first = said[0].partition(" ")
-    plural = "" if many == "1" else "s"
-    return _wrapped("; ".join([f"{many} other effect{plural}: {first}, limits in {where_}", *said[1:]]), 2)
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
@@ -207,7 +165,7 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 
 def _wrote(diagnosis: Diagnosis) -> list[str]:
     names = [*diagnosis.files, *reversed(delivered(diagnosis))]
-    lines = [f"Wrote {' '.join(names)}" if names else "", *left_out(diagnosis)]
+    lines = [f"Wrote {' '.join(names)}" if names else "", *words.left_out(diagnosis)]
     return [line for text in lines for line in _wrapped(text, 0)]
 
 

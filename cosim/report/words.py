@@ -19,8 +19,8 @@ ANSWERS = {
     "not_testable": "Not testable",
     "unknown": "Unknown",
 }
-ABSENT = ("not_decided", "not_seen", "not_testable")
-"""Answers about effects of which nothing is shown."""
+ABSENT = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
+"""Answers about effects of which nothing is shown, in words."""
 MEANINGS = (
     (
         "found",
@@ -108,12 +108,8 @@ def law(diagnosis: Diagnosis) -> str:
         other = f"{told['proposed']} instead of {told['base']}"
     if curve > gain:
         other, gain = f"a curve over speed that is not that of {told['base']}", curve
-    return (
-        f"Friction law: {other} would reduce the residual variance by up to {100 * gain:.0f} %; "
-        "not counted as a missing effect."
-        if other
-        else ""
-    )
+    less = f"would reduce the residual variance by up to {100 * gain:.0f} %; not counted as a missing effect."
+    return f"Friction law: {other} {less}" if other else ""
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -211,15 +207,12 @@ def sized(finding: Finding) -> tuple[str, str]:
         return "", ""
     size = re.fullmatch(r"([-−\d.e+]+) (rad|m)", finding.size)
     if not size:
-        return spelled(minus(finding.size)), spelled(minus(_thousands(finding.size_range)))
+        long = r"(?<![\w.,])\d{5,}(?![\w,])"  # with separators, as those of tables have
+        size_range = re.sub(long, lambda found: f"{int(found[0]):,}", finding.size_range)
+        return spelled(minus(finding.size)), spelled(minus(size_range))
     scale = scale_of(size[2], abs(_value(size[1])))
     ends = tuple(_value(end) * scale.factor for end in finding.size_range.split(" to ") if end)
     return scale.text(_value(size[1]), 3), " to ".join(decimals(ends, 3))
-
-
-def _thousands(text: str) -> str:
-    """Return a range whose long numbers have separators, as those of tables have."""
-    return re.sub(r"(?<![\w.,])\d{5,}(?![\w,])", lambda found: f"{int(found[0]):,}", text)
 
 
 def in_handy_units(text: str) -> str:
@@ -245,19 +238,16 @@ def shows_from(finding: Finding) -> str:
     """Return the smallest size that would have shown, with the unit of the size."""
     if finding.visible_from is None:
         return ""
-    size = _limit(finding.visible_from, unit_of(finding))
+    unit = unit_of(finding)
+    size = joined(trimmed(number(finding.visible_from)), unit)
+    if unit in ("rad", "m"):
+        size = scale_of(unit, abs(finding.visible_from)).text(finding.visible_from)
     return f"{size} {finding.evidence}" if finding.answer == "not_seen" and finding.evidence else size
 
 
 def limit(finding: Finding) -> str:
     """Return from which size, or of what kind, an effect would have shown: "8.3 ms", "wider than 3 mm"."""
     return spelled(in_handy_units(shows_from(finding) or finding.evidence.removeprefix(FROM)))
-
-
-def _limit(value: float, unit: str) -> str:
-    if unit in ("rad", "m"):
-        return scale_of(unit, abs(value)).text(value)
-    return joined(trimmed(number(value)), unit)
 
 
 def unit_of(finding: Finding) -> str:
@@ -285,6 +275,16 @@ def unseen_torque(diagnosis: Diagnosis, scales: Scales) -> str:
     judged = np.concatenate(left) if left else np.empty(0)
     size = float(np.sqrt(np.nanmean(judged**2) * SEEN / (1 - SEEN))) if judged.size else 0.0
     return f"{scales.torque.text(size)} RMS" if size else ""
+
+
+def others(diagnosis: Diagnosis, limits: str) -> str:
+    """Count the effects of which nothing is shown, by answer; `limits` says behind the first where theirs are."""
+    answers = [one.answer for one in diagnosis.findings]
+    counts = [f"{answers.count(answer)} {said}" for answer, said in ABSENT.items() if answer in answers]
+    if not counts:
+        return ""
+    many, _, first = counts[0].partition(" ")
+    return "; ".join([f"{many} other effect{'' if many == '1' else 's'}: {first}{limits}", *counts[1:]])
 
 
 def either(sentences: list[str]) -> list[str]:

@@ -1,6 +1,6 @@
 """The progress bar: what is done, and how long it will take once that is known."""
 
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 SURE = 1.0
@@ -17,11 +17,7 @@ class Left(TimeRemainingColumn):
         return super().render(task)
 
 
-def columns() -> tuple[ProgressColumn, ...]:
-    """Return what stands in the bar."""
-    return TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), Left()
-
-
 def bar(**options: object) -> Progress:
     """Return a bar; `options` are those of rich."""
-    return Progress(*columns(), **options)  # type: ignore[arg-type]
+    shown = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), Left()
+    return Progress(*shown, **options)  # type: ignore[arg-type]

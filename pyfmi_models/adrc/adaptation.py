@@ -82,8 +82,10 @@ class Adaptation(Estimate):
         now = getattr(seen, self.source)
         this, law = with_symbols(self, symbols, now, PREFIX), with_symbols(self.law, symbols, now, LAW)
         theta, (bristle, before), slopes, chain, packed = cut(state, 3, 2, 2, 2 * POLES, 6)
-        bristle, slopes = _along(_walked(law, (before + now) / 2, period), bristle, slopes, theta)
-        torque, phi = _along(_felt(law, now), bristle, slopes, theta)
+        point, middle = (law, slopes, theta), (before + now) / 2
+        bristle, slopes = _along(lambda one, z: one.advance(z, middle, one.level(middle), period), bristle, *point)
+        point = (law, slopes, theta)
+        torque, phi = _along(lambda one, z: one.contact(z, now, one.level(now)) + one.viscous(now), bristle, *point)
         chain = _passed(phi, chain, 1 - ca.exp(-symbols["observer_bandwidth"] * period))
         delayed = ca.vertcat(chain[POLES - 1], chain[-1], 1)
         learned = _recursion(_unpacked(packed), delayed, this.noise**2 * 2 * CHANCE_TIME / period)
@@ -122,29 +124,12 @@ def _scaled(law: LuGre, level: Scalar, stiffness: Scalar) -> LuGre:
     return replace(law, Fc=level * law.Fc, Fs=peak, sigma0=stiffness * law.sigma0)
 
 
-Formula = Callable[[Any, Any, Any], Any]
-
-
-def _walked(law: LuGre, v: Scalar, period: float) -> Formula:
-    def formula(bristle: Any, level: Any, stiffness: Any) -> Any:
-        this = _scaled(law, level, stiffness)
-        return this.advance(bristle, v, this.level(v), period)
-
-    return formula
-
-
-def _felt(law: LuGre, v: Scalar) -> Formula:
-    def formula(bristle: Any, level: Any, stiffness: Any) -> Any:
-        this = _scaled(law, level, stiffness)
-        return this.contact(bristle, v, this.level(v)) + this.viscous(v)
-
-    return formula
-
-
-def _along(formula: Formula, bristle: Any, slopes: list[Any], theta: list[Any]) -> tuple[Any, list[Any]]:
-    """Value of a formula of bristle, level and stiffness, and its total derivatives by level and stiffness."""
+def _along(
+    formula: Callable[[LuGre, Any], Any], bristle: Any, law: LuGre, slopes: list[Any], theta: list[Any]
+) -> tuple[Any, list[Any]]:
+    """Value of a formula of law and bristle, and its total derivatives by the law's level and stiffness."""
     places = [ca.SX.sym(name) for name in ("bristle", "level", "stiffness")]
-    value = formula(*places)
+    value = formula(_scaled(law, *places[1:]), places[0])
     parts = [value, *ca.horzsplit(ca.jacobian(value, ca.vertcat(*places)))]
     value, by_bristle, *by = ca.substitute(parts, places, [ca.SX(one) for one in (bristle, *theta[:2])])
     return value, [by_bristle * slope + own for slope, own in zip(slopes, by, strict=True)]

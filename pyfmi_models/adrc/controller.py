@@ -16,7 +16,7 @@ import casadi as ca
 
 from pyfmi_models.adrc.estimate import Estimate, Seen, cut, within
 from pyfmi_models.adrc.observer import Observer
-from pyfmi_models.adrc.velocity import ObservedVelocity, Velocity
+from pyfmi_models.adrc.velocity import Velocity
 from pyfmi_models.model import (
     Chapter,
     Model,
@@ -56,7 +56,7 @@ class Adrc:
     gains: Gains
     period: float
     observer: Observer = field(default_factory=Observer)
-    velocity: Velocity = field(default_factory=ObservedVelocity)
+    velocity: Velocity = field(default_factory=Velocity)
     estimates: tuple[Estimate, ...] = ()
 
     def states(self) -> tuple[tuple[Variable, ...], ...]:

@@ -8,9 +8,9 @@ from pyfmi_models.model import Scalar, Variable
 
 @dataclass(frozen=True, kw_only=True)
 class Velocity:
-    """A source of the speed [rad/s] that the speed gain acts on."""
+    """A source of the speed [rad/s] that the speed gain acts on: zeta2, quiet and late as the observer makes it."""
 
-    key: ClassVar[str]
+    key: ClassVar[str] = "observer"
 
     def states(self) -> tuple[Variable, ...]:
         """List what is remembered from tick to tick."""
@@ -18,17 +18,6 @@ class Velocity:
 
     def measure(self, state: list[Any], q: Scalar, observed: Scalar, period: float) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the speed now."""
-        raise TypeError(f"{type(self).__name__} measures no speed")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ObservedVelocity(Velocity):
-    """zeta2: as quiet as the observer's bandwidth makes it, and as late."""
-
-    key: ClassVar[str] = "observer"
-
-    def measure(self, state: list[Any], q: Scalar, observed: Scalar, period: float) -> tuple[list[Any], Scalar]:
-        """`zeta2`."""
         return [], observed
 
 
@@ -51,4 +40,4 @@ class DifferencedVelocity(Velocity):
         return [q], (q - state[0]) / period
 
 
-VELOCITIES: dict[str, Velocity] = {one.key: one for one in (ObservedVelocity(), DifferencedVelocity())}
+VELOCITIES: dict[str, Velocity] = {one.key: one for one in (Velocity(), DifferencedVelocity())}

@@ -23,11 +23,10 @@ class ActuatorLag(DriveEffect):
     told_apart_by: ClassVar[str] = "a lag takes amplitude away at high frequency; a delay turns phase only"
     action: ClassVar[str] = "Check the bandwidth of the current loop and any torque filter in the drive."
     says: ClassVar[str] = "The drive builds up its torque slowly, with a time constant of {0.time_constant_ms:.2g} ms."
+    remembers: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="x", unit="N.m", description="Torque applied by the lagging actuator"),
+    )
     time_constant_ms: Scalar = parameter("ms", "Time constant of the torque build-up", low=0.02, high=200)
-
-    def states(self) -> tuple[Variable, ...]:
-        """One state: the applied torque."""
-        return (Variable(name="x", unit="N.m", description="Torque applied by the lagging actuator"),)
 
     def rate(self, state: Any, command: Scalar) -> Any:
         """`(command - x) / T`."""

@@ -39,14 +39,11 @@ class AltitudeInertia(InertiaEffect):
     told_apart_by: ClassVar[str] = "it follows the altitude, not the position of the azimuth axis itself"
     action: ClassVar[str] = "Nothing needs repair: tell the controller the inertia for the altitude."
     says: ClassVar[str] = "The azimuth carries {0.tube_inertia:.3g} kg·m² more with the tube level than at the zenith."
+    reads: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="altitude", unit="rad", description="Altitude of the tube", nominal=0.7),
+        Variable(name="altitude_rate", unit="rad/s", description="Rate of the altitude", nominal=0.01),
+    )
     tube_inertia: Scalar = parameter("kg.m2", TUBE, low=0)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """Altitude and its rate."""
-        return (
-            Variable(name="altitude", unit="rad", description="Altitude of the tube", nominal=0.7),
-            Variable(name="altitude_rate", unit="rad/s", description="Rate of the altitude", nominal=0.01),
-        )
 
     def inertia(self, inertia: Scalar, motion: Motion) -> Scalar:
         """`J + I cos^2 h`."""
@@ -70,11 +67,10 @@ class AzimuthCentrifugal(LoadEffect):
     told_apart_by: ClassVar[str] = "it grows with the square of the azimuth rate and is nothing at rest"
     action: ClassVar[str] = "Nothing needs repair: slew one axis after the other where it matters."
     says: ClassVar[str] = "Turning in azimuth swings the tube down; it weighs {0.tube_inertia:.3g} kg·m² against it."
+    reads: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="azimuth_rate", unit="rad/s", description="Rate of the azimuth", nominal=0.1),
+    )
     tube_inertia: Scalar = parameter("kg.m2", TUBE, low=0)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The rate of the azimuth."""
-        return (Variable(name="azimuth_rate", unit="rad/s", description="Rate of the azimuth", nominal=0.1),)
 
     def load(self, motion: Motion) -> Scalar:
         """`I sin(2h) A'^2 / 2`."""

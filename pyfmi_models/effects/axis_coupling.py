@@ -93,12 +93,9 @@ class AxisCoupling(Neighbouring):
 
     id: ClassVar[str] = "axis_coupling"
     equation: ClassVar[str] = "h aₙ"
+    reads: ClassVar[tuple[Variable, ...]] = (ACCELERATION,)
     main: ClassVar[Main] = Main("inertia", unit="kg.m2")
     inertia: Scalar = parameter("kg.m2", "Torque per acceleration of the neighbour", default=0.0)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The neighbour's acceleration."""
-        return (ACCELERATION,)
 
     def load(self, motion: Motion) -> Scalar:
         """`h a_n`."""
@@ -114,12 +111,9 @@ class DampedCoupling(AxisCoupling):
     """Inertia that both axes accelerate, and drives that drag each other: torque = h a_n + d v_n, v_n its speed."""
 
     equation: ClassVar[str] = "h aₙ + d vₙ"
+    reads: ClassVar[tuple[Variable, ...]] = (ACCELERATION, SPEED)
     main: ClassVar[Main] = Main("damping", unit="N.m.s/rad")
     damping: Scalar = parameter("N.m.s/rad", "Torque per speed of the neighbour")
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The neighbour's acceleration and speed."""
-        return (ACCELERATION, SPEED)
 
     def load(self, motion: Motion) -> Scalar:
         """`h a_n + d v_n`."""
@@ -139,14 +133,11 @@ class WeightCoupling(AxisCoupling):
     """
 
     equation: ClassVar[str] = "h aₙ + w sin(s q + qₙ + φ)"
+    reads: ClassVar[tuple[Variable, ...]] = (ACCELERATION, POSITION)
     main: ClassVar[Main] = Main("weight")
     weight: Scalar = parameter("N.m", "Weight times lever arm", low=0)
     phase: Scalar = parameter("rad", "Phase at both positions zero", default=0.0)
     follows: Scalar = parameter("1", "Turns of the weight per turn of this axis", default=1.0, fitted=False)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The neighbour's acceleration and position."""
-        return (ACCELERATION, POSITION)
 
     def load(self, motion: Motion) -> Scalar:
         """`h a_n + w sin(s q + q_n + phase)`."""
@@ -170,15 +161,12 @@ class ChainCoupling(Neighbouring):
 
     id: ClassVar[str] = AxisCoupling.id
     equation: ClassVar[str] = "w sin(s q + qₙ + s₂ qₘ + φ)"
+    reads: ClassVar[tuple[Variable, ...]] = (POSITION, SECOND)
     main: ClassVar[Main] = Main("weight")
     weight: Scalar = parameter("N.m", "Weight times lever arm", low=0)
     phase: Scalar = parameter("rad", "Phase at all positions zero", default=0.0)
     follows: Scalar = parameter("1", "Turns of the weight per turn of this axis", default=1.0, fitted=False)
     follows_second: Scalar = parameter("1", "Turns of the weight per turn of the second neighbour", fitted=False)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """Both neighbours' positions."""
-        return (POSITION, SECOND)
 
     def load(self, motion: Motion) -> Scalar:
         """`w sin(s q + q_n + s2 q_m + phase)`."""
@@ -203,6 +191,7 @@ class SpaceCoupling(Neighbouring):
 
     id: ClassVar[str] = AxisCoupling.id
     equation: ClassVar[str] = "Σ wᵢⱼₖ fᵢ(q) fⱼ(qₙ) fₖ(qₘ), f = sin, cos"
+    reads: ClassVar[tuple[Variable, ...]] = (POSITION, SECOND)
     main: ClassVar[Main] = Main("sss")
     sss: Scalar = parameter("N.m", "Torque per sin q sin q_n sin q_m", default=0.0)
     ssc: Scalar = parameter("N.m", "Torque per sin q sin q_n cos q_m", default=0.0)
@@ -212,10 +201,6 @@ class SpaceCoupling(Neighbouring):
     csc: Scalar = parameter("N.m", "Torque per cos q sin q_n cos q_m", default=0.0)
     ccs: Scalar = parameter("N.m", "Torque per cos q cos q_n sin q_m", default=0.0)
     ccc: Scalar = parameter("N.m", "Torque per cos q cos q_n cos q_m", default=0.0)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """Both neighbours' positions."""
-        return (POSITION, SECOND)
 
     def load(self, motion: Motion) -> Scalar:
         """The sum of the eight products."""

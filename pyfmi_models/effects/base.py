@@ -72,6 +72,17 @@ def words(unit: str) -> dict[str, str]:
     return LINEAR if unit == "N" else ROTARY
 
 
+def percent(share: float) -> str:
+    """Return a share in per cent with two digits, and all of those before the point: 0.42 becomes 42 %, 1.893 189 %."""
+    value = 100 * share
+    return f"{value:.0f} %" if abs(value) >= 99.5 else f"{value:.2g} %"
+
+
+def higher(share: float) -> str:
+    """Say how far something is off, to either side: 42 % higher, 30 % lower."""
+    return f"{percent(abs(share))} {'higher' if share >= 0 else 'lower'}"
+
+
 def times(count: float) -> str:
     """How often, in words: "once", "24 times"."""
     return "once" if count == 1 else f"{count:.4g} times"
@@ -120,16 +131,20 @@ class Effect(Part):
     reads an input in the torque path or has a memory that is not linear in its states."""
     ordered: ClassVar[tuple[tuple[str, str, float], ...]] = ()
     """Parameters of which the second is above the first, and the least factor between them that a fit keeps."""
+    reads: ClassVar[tuple[Variable, ...]] = ()
+    """`inputs`, where they are the same with all numbers."""
+    remembers: ClassVar[tuple[Variable, ...]] = ()
+    """`states`, where they are the same with all numbers."""
     says: ClassVar[str] = ""
     """`statement` where it has one form: `{0.mgl:.3g} {unit}`, with words of `ROTARY` and `LINEAR`."""
 
     def states(self) -> tuple[Variable, ...]:
         """Name the effect's own states."""
-        return ()
+        return self.remembers
 
     def inputs(self) -> tuple[Variable, ...]:
         """Name the plant inputs that the effect reads; effects that name the same input of one source share it."""
-        return ()
+        return self.reads
 
     def recorded_as(self) -> Mapping[str, str]:
         """Inputs that a recording holds under another name, by their own."""

@@ -37,6 +37,9 @@ class BoucWen(LoadEffect):
     rivals: ClassVar[tuple[str, ...]] = ("presliding", "cable_wrap", "backlash", "friction_asymmetry")
     told_apart_by: ClassVar[str] = "after a turn the torque changes over a way that is far longer than a contact bends"
     action: ClassVar[str] = "Look at belt tension and the gear's preload; for fine tracking use the improved model."
+    remembers: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="z", unit="1", description="Hysteresis, along the motion"),
+    )
     torque: Scalar = parameter("N.m", "Torque per unit of z; with the defaults, half the height of a long loop", low=0)
     stroke: Scalar = parameter("rad", "Way over which the loop turns round", low=1e-9, nominal=0.1)
     A: Scalar = parameter("1", "Rise of z where it is zero", default=1.0, low=1e-3, high=1e3, fitted=False)
@@ -50,10 +53,6 @@ class BoucWen(LoadEffect):
             return ""
         rule = f"must be above -beta and at most beta = {self.beta:g}"
         return f"gamma = {self.gamma:g} {rule}: only then z is bounded and gives no more energy than it took"
-
-    def states(self) -> tuple[Variable, ...]:
-        """One state: how far the loop has turned."""
-        return (Variable(name="z", unit="1", description="Hysteresis, along the motion"),)
 
     def rate(self, motion: Motion) -> Any:
         """The equation above."""

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission, words
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission, percent, words
 from pyfmi_models.model import Scalar, parameter
 
 LEAST_DAMPING = 1e-4

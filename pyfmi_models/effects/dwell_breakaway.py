@@ -27,13 +27,12 @@ class DwellBreakaway(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "presliding")
     told_apart_by: ClassVar[str] = "the same move costs more after a longer rest; a Stribeck curve knows no rest"
     action: ClassVar[str] = "Move the axis a little before fine positioning after a long rest."
+    remembers: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="age", unit="s", description="Age of the contact", low=0.0),
+    )
     torque_per_efold: Scalar = parameter("N.m", "Rise of the break-away torque per e-fold of rest time", low=0)
     onset_s: Scalar = parameter("s", "Rest time at which the rise begins", default=0.1, low=1e-6, fitted=False)
     memory_rad: Scalar = parameter("rad", "Slip that renews the contact", default=1e-3, low=1e-9, nominal=1e-3)
-
-    def states(self) -> tuple[Variable, ...]:
-        """One state: the age of the contact."""
-        return (Variable(name="age", unit="s", description="Age of the contact", low=0.0),)
 
     def rate(self, motion: Motion) -> Any:
         """`1 - age |v| / memory`."""

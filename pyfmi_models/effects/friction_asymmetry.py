@@ -5,8 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, percent
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 MOST = 0.6

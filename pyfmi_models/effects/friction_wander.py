@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import FrictionEffect, Motion, percent
 from pyfmi_models.model import Scalar, parameter
 
 WAVES = 8

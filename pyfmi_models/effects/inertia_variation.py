@@ -5,8 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import InertiaEffect, Main, Motion, times, words
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import InertiaEffect, Main, Motion, percent, times, words
 from pyfmi_models.model import Scalar, parameter
 
 

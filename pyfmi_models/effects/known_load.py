@@ -21,11 +21,10 @@ class KnownLoad(PayloadEffect):
     told_apart_by: ClassVar[str] = "it follows the load that was recorded; an unbalance follows the position alone"
     action: ClassVar[str] = "Nothing: the load is known."
     says: ClassVar[str] = "The known load acts with {0.gain:.3g} {unit} of drive torque for each {unit}."
+    reads: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="load_torque", unit="N.m", description="Known load, resists"),
+    )
     gain: Scalar = parameter("1", "Drive torque per torque of the load", default=1.0, low=0, high=1e3)
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The load."""
-        return (Variable(name="load_torque", unit="N.m", description="Known load, resists"),)
 
     def load(self, motion: Motion) -> Scalar:
         """`gain load_torque`."""

@@ -10,9 +10,8 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion, percent
 from pyfmi_models.effects.learned_base import MotionTable
-from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Scalar, parameter, structure
 
 TINY = 1e-12

@@ -7,10 +7,9 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import DriveEffect, Motion
+from pyfmi_models.effects.base import DriveEffect, Motion, percent
 from pyfmi_models.effects.learned_base import FOLLOWED, MOST_WAVES, ROWS, Array, LearnedEffect, TableEffect
 from pyfmi_models.effects.learned_table import LearnedTable
-from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Scalar, parameter, structure
 from pyfmi_models.waves import broken_range, span, spoken, waves
 
@@ -53,7 +52,7 @@ class LearnedDrive(LearnedEffect, DriveEffect):
             return f"missing has {len(self.missing)} coefficients; it needs 1 to {MOST_WAVES}"
         if rule := broken_range("command", "command_seen", self.command_seen):
             return rule
-        return "the drive gives less where it is asked for more" if self._falls() else ""
+        return "the drive gives less where it is asked for more" if self._steepest() >= 1 else ""
 
     def learned_in(self, linear: bool = False) -> str:
         """Say the range."""
@@ -76,9 +75,6 @@ class LearnedDrive(LearnedEffect, DriveEffect):
         """What is missing of commands over the range seen."""
         command, missing = self.curve(ROWS)
         return {"kind": self.kind, "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
-
-    def _falls(self) -> bool:
-        return self._steepest() >= 1
 
     def _steepest(self) -> float:
         """Largest rise of what is missing per command."""

@@ -6,10 +6,9 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion, MotionEffect
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion, MotionEffect, higher
 from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.effects.learned_table import LearnedTable
-from pyfmi_models.effects.shares import higher
 from pyfmi_models.model import Scalar, Variable, parameter, structure
 
 MOST = 12

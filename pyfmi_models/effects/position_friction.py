@@ -5,8 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times, words
-from pyfmi_models.effects.shares import higher, percent
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher, percent, times, words
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 

@@ -5,9 +5,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher
 from pyfmi_models.effects.position_friction import around, bump
-from pyfmi_models.effects.shares import higher
 from pyfmi_models.model import Scalar, parameter
 
 

@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, words
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, percent, words
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 REFERENCE = 20.0
@@ -34,14 +33,13 @@ class ThermalViscosity(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("quadratic_drag",)
     told_apart_by: ClassVar[str] = "the same fast move differs early and late, cold and warm; drag does not"
     action: ClassVar[str] = "Warm the axis up before identification, or record the temperature with it."
+    reads: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="temperature", unit="degC", description="Temperature of the bearing", start=REFERENCE),
+    )
     viscous_per_degC: Scalar = parameter("1/K", "Relative change of viscous friction per degree", low=-1, high=1)
     coulomb_per_degC: Scalar = parameter(
         "1/K", "Relative change of the friction level per degree", default=0.0, low=-1, high=1
     )
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The temperature."""
-        return (Variable(name="temperature", unit="degC", description="Temperature of the bearing", start=REFERENCE),)
 
     def warmth(self, motion: Motion) -> Scalar:
         """`T - 20 degC`."""
@@ -81,15 +79,15 @@ class _HeatedViscosity(ThermalViscosity):
     No thermometer has seen the rise: texts give what friction changes by, and over what time or way, not per degree.
     """
 
+    remembers: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="rise", unit="K", description="Rise of temperature in use"),
+    )
+
     def leading(self) -> Main:
         """The larger of the two changes, as a text gives it."""
         name, *_, is_size = super().leading()
         number = float(getattr(self, name))
         return Main(name, 100 * self.change(number) / number if number else 0.0, f"% {self.by('rad')}", is_size)
-
-    def states(self) -> tuple[Variable, ...]:
-        """One state: how much warmer than `temperature` the bearing is."""
-        return (Variable(name="rise", unit="K", description="Rise of temperature in use"),)
 
     def warmth(self, motion: Motion) -> Scalar:
         """`temperature + rise - 20 degC`."""

@@ -5,8 +5,7 @@ from typing import Any, ClassVar, Self
 
 import casadi as ca
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion
-from pyfmi_models.effects.shares import percent
+from pyfmi_models.effects.base import DriveEffect, Main, Motion, percent
 from pyfmi_models.effects.thermal_viscosity import REFERENCE
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -63,10 +62,9 @@ class WarmTorqueDroop(TorqueDroop):
     per_degC: Scalar = parameter("1/K", "Relative change of the torque constant per degree", low=-0.05, high=0.05)
     warmth: Scalar = 0.0
     """T - 20 degC of the moment, see `given`; no key of a card."""
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """The temperature."""
-        return (Variable(name="temperature", unit="degC", description="Temperature of the motor", start=REFERENCE),)
+    reads: ClassVar[tuple[Variable, ...]] = (
+        Variable(name="temperature", unit="degC", description="Temperature of the motor", start=REFERENCE),
+    )
 
     def given(self, motion: Motion) -> Self:
         """At this temperature."""

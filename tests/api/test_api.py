@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from report_example import diagnosis
 
 import cosim
-from cosim.api.diagnose import DiagnosisResult, check_split
-from cosim.api.tables import missing_frame
+from cosim.api.diagnose import DiagnosisResult, check_split, missing_frame
 from cosim.cli.verbs import module_of
 from cosim.data.recording import Recording
 from cosim.support.notebook import shows_progress

@@ -29,7 +29,7 @@ from pyfmi_models.effects import (
     SensorEffect,
     Transmission,
 )
-from pyfmi_models.effects.shares import higher, percent
+from pyfmi_models.effects.base import higher, percent
 from pyfmi_models.friction import Frictionless, LuGre
 from pyfmi_models.model import Model, parameters_of
 
