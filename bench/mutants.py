@@ -59,7 +59,7 @@ GROUPS = {
     "delivery": ("cosim/delivery/*.py", "cosim_simulators/*.py", "cosim_nesting/*.py", "cosim_nesting/c/*.c"),
     "hardware": ("cosim/hardware/*.py", "cosim/hardware/*.c", "cosim_ethercat/*.py"),
     "interface": ("cosim/cli/*.py", "cosim/api/*.py"),
-    "exchange": ("cosim_calibration/*.py", "cosim/experiments/*.py", "cosim/sweeps/*.py", "cosim_investigation/*.py"),
+    "exchange": ("cosim_calibration/*.py", "cosim/experiments/*.py", "cosim_sweeps/*.py", "cosim_investigation/*.py"),
 }
 """Rooms of the product; of each as many errors are drawn."""
 QUIET = ("-n0", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE", "--timeout=60")

@@ -95,9 +95,9 @@ def ratio(slow: list[float], fast: list[float]) -> dict[str, Any]:
 def swept(folder: Path, runs: int, seed: int, workers: int | None = None, address: str = "") -> float:
     """Return the seconds of a whole sweep into a folder of its own; a run that fails is no measurement."""
     from cosim.models.cache import with_fmus
-    from cosim.sweeps.conduct import conduct
-    from cosim.sweeps.file import read_sweep
     from cosim.system.scenario import read_scenario
+    from cosim_sweeps.conduct import conduct
+    from cosim_sweeps.file import read_sweep
 
     file = folder / "sweep.toml"
     file.write_text(SWEEP.format(runs=runs, seed=seed))
@@ -185,7 +185,7 @@ def write(found: dict[str, Any], out: Path, folder: Path) -> None:
     from matplotlib.figure import Figure
 
     from cosim.plots.style import AFTER, BEFORE, GREY, STYLE
-    from cosim.plots.sweep import draw
+    from cosim_sweeps.picture import draw
 
     out.mkdir(parents=True, exist_ok=True)
     (out / "sweep.md").write_text(page(found), "utf-8")

@@ -23,9 +23,9 @@ from cosim.data.signals import Slews
 from cosim.data.star import SIDEREAL_RATE
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
-from cosim.sweeps.conduct import conduct
-from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import Scenario, read_scenario
+from cosim_sweeps.conduct import conduct
+from cosim_sweeps.file import read_sweep
 
 COMMAND = "python bench/two_axis.py --out results/master"
 ARCSEC = pi / 648000

@@ -18,8 +18,8 @@
 
 SI units inside, other units only where files come in. Time is counted in integer ticks, never summed. Results print
 themselves on a terminal and show themselves in a notebook. A name is loaded when it is first used: `import cosim` alone
-costs next to nothing; `investigate`, `check_effect` and `check_law` come from packages that are plugged in. What these
-raise on purpose is a `CosimError` or a `ModelError`, and its text is one sentence.
+costs next to nothing; `sweep`, `investigate`, `check_effect` and `check_law` come from packages that are plugged in.
+What these raise on purpose is a `CosimError` or a `ModelError`, and its text is one sentence.
 """
 
 from importlib import import_module
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from cosim.api.recordings import read
     from cosim.api.run import run
     from cosim.api.show import Shown, show
-    from cosim.api.sweep import SweepResult, sweep
     from cosim.data.recording import Recording
     from cosim.master.result import RunResult
     from cosim.support.errors import CheckError, CosimError, InputError, StepError
@@ -53,6 +52,8 @@ if TYPE_CHECKING:
     from cosim_checks.suite import Checks as Checks
     from cosim_investigation.investigate import InvestigateResult as InvestigateResult
     from cosim_investigation.investigate import investigate as investigate
+    from cosim_sweeps.front import SweepResult as SweepResult
+    from cosim_sweeps.front import sweep as sweep
     from pyfmi_models.card import Card, read_card
     from pyfmi_models.errors import ModelError
     from pyfmi_models.plugins import load_plugins
@@ -70,7 +71,6 @@ _HOMES = {
     "cosim.api.run": ("run",),
     "cosim.master.result": ("RunResult",),
     "cosim.api.show": ("Shown", "show"),
-    "cosim.api.sweep": ("SweepResult", "sweep"),
     "cosim.data.recording": ("Recording",),
     "cosim.support.errors": ("CheckError", "CosimError", "InputError", "StepError"),
     "pyfmi_models.card": ("Card", "read_card"),
@@ -96,7 +96,6 @@ __all__ = [
     "RunResult",
     "Shown",
     "StepError",
-    "SweepResult",
     "__version__",
     "card",
     "check",
@@ -111,7 +110,6 @@ __all__ = [
     "read_card",
     "run",
     "show",
-    "sweep",
 ]
 
 

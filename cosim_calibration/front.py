@@ -17,7 +17,7 @@ from cosim.support.files import sha256 as sha256_of
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
-from cosim.sweeps.portable_job import files_of
+from cosim.system.portable_job import files_of
 from cosim.system.scenario import Scenario, read_scenario
 from cosim_calibration import deliver
 from cosim_calibration.calibrate import Calibrated, Options

@@ -16,10 +16,9 @@ from typing import Any, Self
 from uuid import uuid4
 
 from cosim.support.cell import Cell, LostError, ending
+from cosim.support.cells import MOST, close_cells, most_workers, own_cell
 from cosim.support.errors import CosimError, InputError
-from cosim.sweeps.cluster import on_cluster
-from cosim.sweeps.pool import MOST, close_cells, most_workers, own_cell
-from cosim.sweeps.portable_job import PortableJob
+from cosim.system.portable_job import PortableJob, on_cluster
 from cosim_calibration.simulation import Answer, Job, Outputs, Point, keeps_at, outputs_at, prepare, slopes_at
 from cosim_calibration.store import Store
 

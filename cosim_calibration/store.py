@@ -18,7 +18,7 @@ import numpy as np
 
 from cosim.support.errors import CosimError, OutputError
 from cosim.support.files import directory, replacing
-from cosim.sweeps.journal import RUNS, Journal, clear
+from cosim.support.journal import RUNS, Journal, clear
 from cosim_calibration.simulation import Answer, Outputs, Point
 
 FOLDER, POINTS = "progress", "points"

@@ -13,7 +13,7 @@ from cosim.fmi.description import INTERFACES, describe, own_step_of
 from cosim.fmi.sound import inherited
 from cosim.fmi.variables import ports_of
 from cosim.support.errors import InputError
-from cosim.sweeps.address import Address, addresses
+from cosim.system.address import Address, addresses
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
 

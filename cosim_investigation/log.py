@@ -12,7 +12,7 @@ from pathlib import Path
 from cosim.data.recording import Recording
 from cosim.support.errors import OutputError
 from cosim.support.files import sha256
-from cosim.sweeps.journal import RUNS, Journal, clear
+from cosim.support.journal import RUNS, Journal, clear
 from cosim_investigation.story import Answered, Moved, answered_of, moved_of
 
 KIND, RECORDINGS, DIAGNOSIS = "investigation", "recordings", "diagnosis"

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from cosim.support.errors import InputError
-from cosim.sweeps.address import addresses, find
-from cosim.sweeps.variation import Value
+from cosim.system.address import Value, addresses, find
 from cosim.system.scenario import Scenario
 from cosim.system.ticks import whole
 
@@ -18,7 +17,7 @@ def changed(scenario: Scenario, values: Mapping[str, Value], stop: float | None 
 
     Args:
         scenario: its components have their FMUs.
-        values: by name: "controller.kp", "reference.frequency", "plant.tau.gain"; see `cosim.sweeps.address`.
+        values: by name: "controller.kp", "reference.frequency", "plant.tau.gain"; see `cosim.system.address`.
         stop: time at which the run ends instead [s].
 
     Raises:

@@ -6,22 +6,21 @@ OUT/machines.jsonl    a line for each machine as it is done: what is done goes o
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from cosim.api.machine_work import Options, Order, PortableOrder, diagnose_away, diagnose_here, take
 from cosim.api.machines import DOCUMENT, JOURNAL, Machine, MachineResult, machines_in, read_result
 from cosim.support.cell import LostError
+from cosim.support.cells import as_they_come, close_cells, most_workers, own_cell, threads
+from cosim.support.cluster import connected
 from cosim.support.command import command_of
 from cosim.support.errors import CosimError, InputError
 from cosim.support.html import table as html_table
 from cosim.support.lock import claimed
-from cosim.sweeps.cluster import connected
-from cosim.sweeps.pool import close_cells, most_workers, own_cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,7 +167,7 @@ def _conducted(
             journal.write("\n" if known else "")  # a kill may have left half a line
             pool = _on_cluster(cluster) if cluster else _here(size)
             submit, most = stack.enter_context(pool)
-            for result in _each(rest, submit, most):
+            for result in as_they_come(rest, submit, most):
                 _note(journal, result, keys[result.name])
                 yield result
 
@@ -197,43 +196,24 @@ def _note(journal: IO[str], result: MachineResult, key: str) -> None:
 Submit = Callable[[Order], "Future[MachineResult]"]
 
 
-def _each(orders: Sequence[Order], submit: Submit, most: int) -> Iterator[MachineResult]:
-    """Yield results as they come; at most `most` are given away at a time."""
-    rest = iter(orders)
-    pending = {submit(one) for one in islice(rest, most)}
-    try:
-        while pending:
-            done, pending = wait(pending, return_when=FIRST_COMPLETED)
-            pending |= {submit(one) for one in islice(rest, len(done))}
-            yield from (future.result() for future in done)
-    finally:
-        for future in pending:
-            future.cancel()
-
-
 @contextmanager
 def _here(workers: int) -> Iterator[tuple[Submit, int]]:
     """Diagnose in processes of this computer, which end with this one."""
-    threads = ThreadPoolExecutor(workers, "machine")
-    try:
-        yield lambda order: threads.submit(_diagnosed, order), workers
-    finally:
-        threads.shutdown(wait=False, cancel_futures=True)
-        close_cells()
-        threads.shutdown()
+    with threads(workers, "machine") as executor:
+        yield lambda order: executor.submit(_diagnosed, order), workers
 
 
 @contextmanager
 def _on_cluster(address: str) -> Iterator[tuple[Submit, int]]:
     """Diagnose on a Dask cluster; errors as of `connected`."""
-    with connected(address, close_cells) as (client, threads), ThreadPoolExecutor(2 * threads, "machine") as waiting:
+    with connected(address, close_cells) as (client, size), ThreadPoolExecutor(2 * size, "machine") as waiting:
 
         def away(order: Order) -> MachineResult:
             portable = client.scatter(PortableOrder.of(order), hash=False)
             future = client.submit(_remote, portable, _command(order), pure=False)
             return _result(order, lambda: take(_arrived(future), order.out))
 
-        yield lambda order: waiting.submit(away, order), 2 * threads
+        yield lambda order: waiting.submit(away, order), 2 * size
 
 
 def _arrived(future: Any) -> dict[str, bytes]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from cosim.api.changes import changed
 from cosim.master.session import Session
 from cosim.models.cache import with_fmus
-from cosim.sweeps.variation import Value
+from cosim.system.address import Value
 from cosim.system.scenario import Scenario, read_scenario
 from cosim.system.system import System
 

@@ -14,7 +14,7 @@ from cosim.models.cache import with_fmus
 from cosim.plots.digest import tracking
 from cosim.support.files import check_free, replacing
 from cosim.support.lock import claimed
-from cosim.sweeps.variation import Value
+from cosim.system.address import Value
 from cosim.system.scenario import Scenario, read_scenario
 
 RECORDING, STATISTICS, PAGE = "recording.parquet", "run.json", "run.html"

@@ -5,13 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.api.show_results import result, sweep_file
+from cosim.api.show_results import result
 from cosim.support.errors import FmuError, InputError
 from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.near import did_you_mean
 from cosim.support.plain import Json
+from cosim.support.plugins import TOML, loaded, names
 from cosim.system.variant import ssp_of
 
 if TYPE_CHECKING:
@@ -233,8 +234,9 @@ def _toml(file: str) -> tuple[Facts, Tables]:
             keys = parsed(path.read_text("utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"{file} is not valid TOML: {error}.", culprit=file) from error
-        if "vary" in keys:
-            return sweep_file(path)
+        if key := next((one for one in names(TOML) if one in keys), ""):
+            plugged: tuple[Facts, Tables] = loaded(TOML, key)(path)
+            return plugged
         return _card(file) if "mount" in keys else _scenario(file)
     from cosim.system.scenario import shipped_scenarios
 

@@ -3,21 +3,17 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cosim.api.show_exchange import calibration, checked
 from cosim.support.errors import InputError
 from cosim.support.plain import Json, Parsed
-
-if TYPE_CHECKING:
-    from cosim.plots.sweep import Results
+from cosim.support.plugins import RESULTS, loaded, names
 
 Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
-DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
+DIAGNOSIS, RUN = "diagnosis.json", "run.json"
 COMPARISON, PROOF = "compare.json", "proof.json"
 IDENTIFIED, CHECK = "identified.json", "check.json"
-FIRST = 20
-"""Runs of a sweep that are listed, the best first."""
 
 
 def result(path: Path) -> Shown | None:
@@ -26,20 +22,24 @@ def result(path: Path) -> Shown | None:
     Raises:
         InputError: the file is one of ours by its name, and cannot be read.
     """
+    known = (*_READERS, *names(RESULTS))
     if path.is_dir():
-        found = [name for name in _READERS if (path / name).is_file()]
-        return _read_result(path / found[0]) if found else None
-    if path.name not in _READERS or not path.is_file() or (path.name == TABLE and not _is_sweep(path)):
+        found = [path / name for name in known if (path / name).is_file()]
+        return _read_result(found[0]) if found else None
+    if path.name not in known or not path.is_file():
         return None
-    if path.name in _KEYS and not _holds(path, _KEYS[path.name]):
-        return None  # a recording that happens to have this name
-    return _read_result(path)
+    return _read_result(path, may_be_foreign=path.name not in (DIAGNOSIS, RUN))
 
 
-def _read_result(path: Path) -> Shown:
+def _read_result(path: Path, may_be_foreign: bool = False) -> Shown | None:
     """Read a file of ours; what in it is not as we write it is a sentence (InputError)."""
+    read: Callable[[Path], Shown] = _READERS.get(path.name) or loaded(RESULTS, path.name)
     try:
-        return _READERS[path.name](path)
+        return read(path)
+    except InputError:
+        if may_be_foreign:
+            return None  # a recording that happens to have this name
+        raise
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         text = f"{path} is named as a file of this project, and is not as it was written: {error}."
         raise InputError(text, culprit=str(path)) from error
@@ -105,16 +105,8 @@ def _rounded(value: Json) -> Json:
     return float(f"{value:.4g}") if isinstance(value, float) else value
 
 
-def _holds(path: Path, keys: tuple[str, ...]) -> bool:
-    try:
-        _document(path, *keys)
-    except InputError:
-        return False
-    return True
-
-
 def _comparison(path: Path) -> Shown:
-    document = _document(path, *_KEYS[COMPARISON])
+    document = _document(path, "recordings", "span", "rows", "differences")
     first = str(document["recordings"][0])
     facts: dict[str, Json] = {
         "comparison": str(path),
@@ -129,7 +121,7 @@ def _comparison(path: Path) -> Shown:
 
 
 def _proof(path: Path) -> Shown:
-    document = _document(path, *_KEYS[PROOF])
+    document = _document(path, "played", "cases", "scores", "command")
     facts: dict[str, Json] = {
         "blind benchmark": str(path),
         "cases": f"{document['played']} of {document['cases']}, seed {document['seed']}",
@@ -143,75 +135,16 @@ def _proof(path: Path) -> Shown:
 
 
 def _calibration(path: Path) -> Shown:
-    return calibration(path, _document(path, *_KEYS[IDENTIFIED]))
+    return calibration(path, _document(path, "source", "numbers", "outputs", "heldout"))
 
 
 def _check(path: Path) -> Shown:
-    return checked(path, _document(path, *_KEYS[CHECK]))
+    return checked(path, _document(path, "fmu", "passed", "experiments", "findings"))
 
 
-def _is_sweep(path: Path) -> bool:
-    from pyarrow import parquet
-
-    from cosim.data.columns import ORIGIN_KEY
-
-    try:
-        held = parquet.read_schema(path).metadata or {}
-        return "sweep" in json.loads(held.get(ORIGIN_KEY, b"{}"))
-    except (OSError, ValueError):
-        return False
-
-
-def _sweep(path: Path) -> Shown:
-    if not _is_sweep(path):
-        raise InputError(f"{path} is no table of a sweep.", culprit=str(path))
-    from cosim.plots.sweep import read_results
-
-    results = read_results(path)
-    facts: dict[str, Json] = {"sweep": results.title, "table": str(path)}
-    if row := results.best_row():
-        facts["best"] = ", ".join(f"{name} = {value:.5g}" for name, value in row.items())
-    picture = path.with_name("sweep.svg")
-    facts |= {"picture": str(picture)} if picture.is_file() else {}
-    return facts, {"runs, the best first": _ranked(results)}
-
-
-def _ranked(results: "Results") -> list[Mapping[str, Json]]:
-    import numpy as np
-
-    columns = {**results.varied, **results.statistics}
-    first = np.abs(next(iter(results.statistics.values())))
-    order = np.argsort(np.where(np.isfinite(first), first, np.inf))[:FIRST]
-    return [
-        {"run": int(k)} | {results.label(name): f"{values[k]:.5g}" for name, values in columns.items()} for k in order
-    ]
-
-
-def sweep_file(path: Path) -> Shown:
-    """Return what a sweep file asks for."""
-    from cosim.sweeps.file import read_sweep
-
-    wanted = read_sweep(path)
-    facts: dict[str, Json] = {
-        "sweep": str(path),
-        "scenario": str(wanted.scenario),
-        "runs": wanted.design.runs,
-        "run it": f"cosim sweep {path}",
-    }
-    return facts, {}
-
-
-_KEYS = {
-    COMPARISON: ("recordings", "span", "rows", "differences"),
-    PROOF: ("played", "cases", "scores", "command"),
-    IDENTIFIED: ("source", "numbers", "outputs", "heldout"),
-    CHECK: ("fmu", "passed", "experiments", "findings"),
-}
-"""What a file must hold to be ours, where its name alone does not say so."""
 _READERS: dict[str, Callable[[Path], Shown]] = {
     DIAGNOSIS: _diagnosis,
     RUN: _run,
-    TABLE: _sweep,
     COMPARISON: _comparison,
     PROOF: _proof,
     IDENTIFIED: _calibration,

@@ -7,7 +7,7 @@ from types import ModuleType
 
 GROUPS = {
     "Diagnose": ("diagnose", "why", "identify", "card", "compare", "show"),
-    "Simulate": ("run", "export", "sweep", "check"),
+    "Simulate": ("run", "export", "check"),
     "Machine": ("hardware", "doctor"),
 }
 """Verbs of this package by what they are for, in the order in which they are listed."""
@@ -32,7 +32,6 @@ EXAMPLES = {
         "cosim export axis.toml --fmi 3 --ssp --out fmus",
         "cosim export sidereal --as-fmu --out fmus",
     ),
-    "sweep": ("cosim sweep gains.toml", "cosim sweep gains.toml --workers 4 --out gains"),
     "check": ("cosim check plant.fmu", "cosim check plant.fmu --json"),
     "hardware": ("cosim hardware check machine.toml", "cosim hardware run --help"),
     "doctor": ("cosim doctor", "cosim doctor --json"),

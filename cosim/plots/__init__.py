@@ -1,1 +1,1 @@
-"""Pictures of runs and sweeps; nothing here is imported while something runs."""
+"""Pictures of runs; nothing here is imported while something runs."""

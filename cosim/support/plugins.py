@@ -12,6 +12,9 @@
                        `read(path, whole, lines)` gives `Columns`
     cosim.formulas     a function that looks for a closed form in the place of a learned table, see
                        `cosim.diagnosis.terms.closed_form`
+    cosim.results      "table.parquet": tells facts and tables of the file of this name, or of the folder that has it;
+                       a function of its path (InputError where it is another's)
+    cosim.toml         "vary": tells facts and tables of a TOML file with this key, in the same way
     cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
                        of a machine file, whose section [NAME] is the pydantic model `section` of the class
 
@@ -25,6 +28,7 @@ from cosim.support.errors import PlugInError
 
 EXPORTS, HANDLES, IDENTIFIERS = "cosim.exports", "cosim.handles", "cosim.identifiers"
 IMPORTERS, READERS = "cosim.importers", "cosim.readers"
+RESULTS, TOML = "cosim.results", "cosim.toml"
 VERBS, TRANSPORTS = "cosim.verbs", "cosim.transports"
 
 

@@ -10,11 +10,11 @@ from time import sleep
 
 from cosim.diagnosis.decide.calibration import OFFSET, SLOPE
 from cosim.support.cell import cores
+from cosim.support.cells import MOST
 from cosim.support.errors import ProofError
+from cosim.support.journal import Journal
 from cosim.support.plain import Parsed
 from cosim.support.version import __version__
-from cosim.sweeps.journal import Journal
-from cosim.sweeps.pool import MOST
 from cosim_studies.proof.cases import CaseSpec, cases_of
 from cosim_studies.proof.page import MADE, proof, write
 from cosim_studies.proof.play import CaseRunner, Tool

@@ -16,8 +16,8 @@ from cosim.master.simulate import run
 from cosim.support.errors import CosimError, InputError, OutputError, ScenarioError, SignalError, SweepError
 from cosim.support.files import check_free
 from cosim.support.numbers import shown
-from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import parse_scenario, read_scenario
+from cosim_sweeps.file import read_sweep
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.errors import CardError
 

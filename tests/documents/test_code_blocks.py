@@ -20,11 +20,11 @@ from cosim.cli.help import epilog
 from cosim.cli.verbs import module_of, verbs
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
-from cosim.sweeps.conduct import conduct
-from cosim.sweeps.file import read_sweep
 from cosim.system.diagram import draw
 from cosim.system.scenario import read_scenario
 from cosim_serve import example
+from cosim_sweeps.conduct import conduct
+from cosim_sweeps.file import read_sweep
 from pyfmi_models.card import parse_card
 
 ROOT = Path(__file__).parents[2]

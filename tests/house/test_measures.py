@@ -75,7 +75,7 @@ NAME = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.[a-zA-Z_]\w*)+")
 BARE = re.compile(r"`(\w+\.(?:py|c|h))`")
 TO_WRITE = {"herschel_bulkley.py", "wind_load.py", "wind_load", "my_drive.py", "camera.py", "equations.c", "model.c"}
 """Files that a reader is told to write, or that an export makes."""
-MOVED = {"cosim.stiffness"}
+MOVED = {"cosim.stiffness", "cosim.sweeps"}
 """Names that the changelog says were moved."""
 GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses"}
 GROUPS |= set(tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"])

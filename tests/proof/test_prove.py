@@ -13,7 +13,7 @@ from prove_rows import ROWS, cautious, crashing, row
 from report_example import diagnosis
 
 from cosim.support.errors import OutputError, ProofError
-from cosim.sweeps.journal import RUNS
+from cosim.support.journal import RUNS
 from cosim_studies.proof import baselines, marks, power, score
 from cosim_studies.proof.cases import SIZES, TOGETHER, cases_of
 from cosim_studies.proof.conduct import Benchmark, conduct

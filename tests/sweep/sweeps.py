@@ -6,9 +6,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from cosim.sweeps.conduct import Summary, conduct
-from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import read_scenario
+from cosim_sweeps.conduct import Summary, conduct
+from cosim_sweeps.file import read_sweep
 
 SCENARIO = """
 step = 1e-3

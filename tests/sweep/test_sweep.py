@@ -16,12 +16,12 @@ from sweeps import SCENARIO, K, R, folder, run, written
 
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.data.recording import Recording
-from cosim.plots.sweep import draw
+from cosim.support.cluster import ADDRESS, _client
 from cosim.support.errors import FmuError, SweepError, WiringError
-from cosim.sweeps.cluster import ADDRESS, _client
-from cosim.sweeps.file import read_sweep
-from cosim.sweeps.statistics import KINDS, Statistic
-from cosim.sweeps.variation import Normal, Range, Values, Variation
+from cosim_sweeps.file import read_sweep
+from cosim_sweeps.picture import draw
+from cosim_sweeps.statistics import KINDS, Statistic
+from cosim_sweeps.variation import Normal, Range, Values, Variation
 
 __all__ = ["folder"]
 

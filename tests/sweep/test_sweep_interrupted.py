@@ -15,7 +15,7 @@ from commands import ENVIRONMENT
 from sweeps import SCENARIO, K, folder, run, written
 from waiting import until
 
-import cosim.sweeps.cluster
+import cosim.support.cluster
 from cosim.support.errors import OutputError, SweepError
 
 __all__ = ["folder"]
@@ -58,8 +58,8 @@ def made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A finished sweep; what is asked again is refused at its folder, before any process is started."""
     path = written(folder)
     run(path)
-    monkeypatch.setattr("cosim.sweeps.conduct.warm", lambda _: None)
-    monkeypatch.setattr("cosim.sweeps.conduct._units", lambda _: {"seconds": "s"})
+    monkeypatch.setattr("cosim_sweeps.conduct.warm", lambda _: None)
+    monkeypatch.setattr("cosim_sweeps.conduct._units", lambda _: {"seconds": "s"})
     return path
 
 
@@ -196,7 +196,7 @@ def test_a_cluster_gives_the_same_table_and_survives_a_crash(folder: Path, monke
 
 def test_a_cluster_that_is_not_there_is_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cosim.sweeps.cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(cosim.support.cluster, "PATIENCE", 0.5)
     with pytest.raises(SweepError, match=r"No Dask scheduler answers at tcp://127.0.0.1:9; give its address as"):
         run(folder / "sweep.toml", address="tcp://127.0.0.1:9", workers=None)
     with pytest.raises(SweepError, match=r"record = true keeps files on this machine; it does not go with --cluster"):

@@ -15,7 +15,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Value = float | bool
+from cosim.system.address import Value
+
 LIMIT = 1_000_000
 """Most runs of one sweep."""
 

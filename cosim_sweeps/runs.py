@@ -1,6 +1,8 @@
-"""One run of a sweep: a point of the parameter space to a row of the table."""
+"""Runs of a sweep: points of the parameter space to rows of the table, in processes of this machine or of a cluster."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -8,15 +10,20 @@ from time import perf_counter
 
 from cosim.data.recording import Recording
 from cosim.master.simulate import run
+from cosim.support.cell import LostError
+from cosim.support.cells import as_they_come, close_cells, own_cell, threads
 from cosim.support.errors import CosimError, StepError
 from cosim.support.plain import Parsed
-from cosim.sweeps.address import Address, addresses, find
-from cosim.sweeps.design import Point
-from cosim.sweeps.file import Sweep
-from cosim.sweeps.statistics import Statistic
+from cosim.system.address import Address, addresses, find
+from cosim.system.portable_job import PortableJob, on_cluster
 from cosim.system.scenario import Scenario
 from cosim.system.wire import Record
+from cosim_sweeps.design import Point
+from cosim_sweeps.file import Sweep
+from cosim_sweeps.statistics import Statistic
 
+Numbered = tuple[int, Point]
+"""A point and the number of its run."""
 Row = Parsed
 """Column to value: run, what was varied, statistics, seconds, status ("ok", "failed", "crashed", "timeout"), reason.
 
@@ -106,3 +113,41 @@ def _keep(job: Job, number: int, recording: Recording) -> None:
     if job.recordings is not None:
         table = {name: recording[name] for name in ("t", *job.kept)}
         replace(recording, table=table).write(job.recordings / f"{number:06d}.parquet", force=True)
+
+
+Submit = Callable[[Numbered], "Future[Row]"]
+
+
+def rows_of(job: Job, points: Sequence[Numbered], workers: int, address: str) -> Generator[Row, None, None]:
+    """Do the runs on a cluster, where there is its address, else in `workers` processes here; errors of `on_cluster`.
+
+    Rows are yielded as they come. A run more waits for each process, on a cluster two.
+    """
+    if points:
+        with _there(job, address) if address else _here(job, workers) as (submit, most):
+            yield from as_they_come(points, submit, most)
+
+
+@contextmanager
+def _here(job: Job, workers: int) -> Iterator[tuple[Submit, int]]:
+    with threads(workers, "sweep") as executor:
+        yield lambda one: executor.submit(_isolated, job, *one), 2 * workers
+
+
+@contextmanager
+def _there(job: Job, address: str) -> Iterator[tuple[Submit, int]]:
+    with on_cluster(job, address, close_cells) as cluster:
+        yield lambda one: cluster.submit(_remote, *one), 3 * cluster.threads
+
+
+def _remote(portable: PortableJob[Job], number: int, point: Point) -> Row:
+    return _isolated(portable.job_here(), number, point)
+
+
+def _isolated(job: Job, number: int, point: Point) -> Row:
+    """Do one run in the cell of this thread; a crash becomes a row."""
+    try:
+        row: Row = own_cell().call(work, job, number, point, timeout=job.timeout)
+    except LostError as loss:
+        return job.begun(number, point) | {"status": loss.status, "reason": str(loss)}
+    return row

@@ -17,11 +17,11 @@ from cosim.fmi.description import describe
 from cosim.fmi.variables import ports_of
 from cosim.support.complaint import complaint
 from cosim.support.errors import ScenarioError, SweepError
-from cosim.sweeps.variation import Value
 from cosim.system.ports import PortRef
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
 
+Value = float | bool
 WIRE_KEYS = {"gain": "1", "offset": "", "quantum": ""}
 
 

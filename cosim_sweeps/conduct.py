@@ -1,24 +1,34 @@
 """A sweep from its file to its table: check, rehearse, run what is not done yet, write."""
 
 import hashlib
-from collections.abc import Callable, Generator, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
+import pyarrow as pa
+from pyarrow import parquet
+
+from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.support.cell import LostError
+from cosim.support.cells import close_cells, free, most_workers, new_cell, warm
 from cosim.support.errors import SweepError
-from cosim.support.files import sha256
+from cosim.support.files import replacing, sha256
+from cosim.support.journal import RUNS, Journal
 from cosim.support.version import __version__
-from cosim.sweeps.file import Sweep
-from cosim.sweeps.job import Job, Row, job_of, rehearse
-from cosim.sweeps.journal import Journal
-from cosim.sweeps.pool import Numbered, Pool, close_cells, cluster, free, local, most_workers, new_cell, warm
-from cosim.sweeps.portable_job import files_of
-from cosim.sweeps.table import write_table
+from cosim.system.portable_job import files_of
 from cosim.system.scenario import Scenario
+from cosim_sweeps.file import Sweep
+from cosim_sweeps.runs import Job, Row, job_of, rehearse, rows_of
 
+TABLE, PICTURE, RECORDINGS = "table.parquet", "sweep.svg", "recordings"
+MADE = ("sweep.json", RUNS, TABLE, PICTURE, RECORDINGS)
+"""Files of the folder: what the runs depend on, a line a run, the table, its picture, a recording a run."""
+TYPES = {"run": pa.int64(), "status": pa.string(), "reason": pa.string()}
+"""Of the table's columns; the others are numbers."""
 OnProgress = Callable[[int, int, int], None]
 """Called after each run with runs done, runs in all, and runs that came to nothing."""
 
@@ -72,18 +82,18 @@ def conduct(
     if sweep.record and address:
         raise SweepError("record = true keeps files on this machine; it does not go with --cluster.", culprit="record")
     begun = perf_counter()
-    job = job_of(sweep, scenario, out / "recordings" if sweep.record else None)
+    job = job_of(sweep, scenario, out / RECORDINGS if sweep.record else None)
     with ExitStack() as stack:
         stack.callback(close_cells)
         if not address:
             warm(processes)
         units = _units(job)
-        journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force, fits=sweep.fits))
+        journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force, "sweep", MADE, sweep.fits))
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
         rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
         failed = sum(journal.rows[run]["status"] != "ok" for run in known)
         table = stack.enter_context(_table(out, sweep, journal, units, _origin(sweep, scenario, command)))
-        rows = stack.enter_context(closing(_rows(_pool(job, processes, address), rest)))
+        rows = stack.enter_context(closing(rows_of(job, rest, processes, address)))
         for done, row in enumerate(rows, len(known) + 1):
             journal.append(row)
             failed += row["status"] != "ok"
@@ -93,25 +103,35 @@ def conduct(
     return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table, len(outside), left)
 
 
-def _rows(pool: AbstractContextManager[Pool], rest: list[Numbered]) -> Generator[Row, None, None]:
-    if rest:
-        with pool as ready:
-            yield from ready.rows(rest)
-
-
-def _pool(job: Job, workers: int, address: str) -> AbstractContextManager[Pool]:
-    return cluster(job, address) if address else local(job, workers)
-
-
 @contextmanager
 def _table(out: Path, sweep: Sweep, journal: Journal, units: dict[str, str], origin: dict[str, str]) -> Iterator[Path]:
     """Write the table of what is done when the block ends, however it ends."""
-    path = out / "table.parquet"
+    path = out / TABLE
     try:
         yield path
     finally:
         rows = [row for _, row in sorted(journal.rows.items())]
-        write_table(path, sweep.columns, rows, units, origin)
+        _write(path, sweep.columns, rows, units, origin)
+
+
+def _write(
+    path: Path, columns: Sequence[str], rows: Sequence[Row], units: Mapping[str, str], origin: Mapping[str, Any]
+) -> None:
+    """Write the rows; numbers that a failed run does not have are null."""
+    fields = [pa.field(name, _type(name), metadata={UNIT_KEY: units.get(name, "").encode()}) for name in columns]
+    schema = pa.schema(fields, metadata={ORIGIN_KEY: json.dumps(dict(origin)).encode()})
+    arrays = [_array(one, [row[one.name] for row in rows]) for one in fields]
+    with replacing(path, force=True) as partial:
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
+
+
+def _array(field: Any, values: Sequence[Any]) -> Any:
+    numbers = map(float, values) if field.type == pa.float64() else values
+    return pa.array(list(numbers), field.type, from_pandas=True)
+
+
+def _type(name: str) -> Any:
+    return TYPES.get(name, pa.float64())
 
 
 def _origin(sweep: Sweep, scenario: Scenario, command: str) -> dict[str, str]:

@@ -1,9 +1,7 @@
-"""The folder of a sweep (or of a proof): what it is, and a line for each run as soon as it is done: nothing is lost.
+"""The folder of a sweep, proof, calibration or investigation: what it is, and a line for each run as it is done.
 
-sweep.json       what the runs depend on, as hashes, and the units of the columns
-runs.jsonl       one row a line, appended; a line cut short by a kill is dropped
-table.parquet    the rows in order, written when the sweep ends, well or not
-recordings/      one file a run, where wanted
+NAME.json     what the runs depend on, as hashes
+runs.jsonl    one row a line, appended; a line cut short by a kill is dropped
 """
 
 import json
@@ -17,34 +15,34 @@ from cosim.support.errors import OutputError
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.interrupts import uninterrupted
 from cosim.support.plain import Parsed
-from cosim.sweeps.job import Row
 
 RUNS = "runs.jsonl"
-MADE = ("sweep.json", RUNS, "table.parquet", "sweep.svg", "recordings")
+Row = Parsed
+"""What is said of a run; its number is "run"."""
 
 
 class Journal:
     """The rows done so far, by run; `append` adds one for good.
 
     Args:
-        folder: of the sweep; made where it is not there.
+        folder: made where it is not there.
         identity: what the runs depend on; a folder with another one is refused.
         force: start over, whatever is there.
-        kind: what the folder holds, in messages.
+        kind: what the folder holds, in messages: "sweep".
         made: files and folders that belong to it; the first is that of the identity.
         fits: whether a row that is found may be one of these runs.
 
     Raises:
-        OutputError: the folder holds another sweep, one that is being written, or rows that another hand changed.
+        OutputError: the folder holds another one, one that is being written, or rows that another hand changed.
     """
 
     def __init__(
         self,
         folder: Path,
         identity: Mapping[str, str],
-        force: bool = False,
-        kind: str = "sweep",
-        made: Sequence[str] = MADE,
+        force: bool,
+        kind: str,
+        made: Sequence[str],
         fits: Callable[[Row], bool] = lambda row: True,
     ) -> None:
         self._fits = fits
@@ -131,8 +129,8 @@ def _check_free(folder: Path, made: Sequence[str]) -> None:
             check_free(folder / name, force=False)
 
 
-def clear(folder: Path, made: Sequence[str] = MADE) -> None:
-    """Remove what a sweep made here, and nothing else."""
+def clear(folder: Path, made: Sequence[str]) -> None:
+    """Remove what was made here, and nothing else."""
     for name in made:
         path = folder / name
         if path.is_dir():

@@ -14,9 +14,9 @@ from cosim.support.errors import SweepError
 from cosim.support.numbers import Count, Seconds
 from cosim.support.plain import Parsed
 from cosim.support.toml import parsed
-from cosim.sweeps.design import Design, grid, latin_hypercube, monte_carlo
-from cosim.sweeps.statistics import Statistic
-from cosim.sweeps.variation import LIMIT, Variation, kind_of
+from cosim_sweeps.design import Design, grid, latin_hypercube, monte_carlo
+from cosim_sweeps.statistics import Statistic
+from cosim_sweeps.variation import LIMIT, Variation, kind_of
 
 OWN = ("run", "seconds", "status", "reason")
 """Columns of every table."""

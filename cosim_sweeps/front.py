@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from cosim.models.cache import with_fmus
-from cosim.plots.sweep import Results, draw, read_results
 from cosim.support.html import facts
 from cosim.support.notebook import shows_progress
-from cosim.sweeps.conduct import Summary, conduct
-from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import read_scenario
-
-PICTURE = "sweep.svg"
+from cosim_sweeps.conduct import PICTURE, Summary, conduct
+from cosim_sweeps.file import read_sweep
+from cosim_sweeps.picture import Results, draw, figure_of, read_results
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,6 @@ class SweepResult:
 
     def plot(self) -> Any:
         """Return the picture as a matplotlib figure."""
-        from cosim.plots.sweep import figure_of
-
         return figure_of(self.results)
 
     def __str__(self) -> str:
@@ -81,7 +77,7 @@ def sweep(
     """Run a scenario many times; write `out`/table.parquet, a row a run, and `out`/sweep.svg, its picture.
 
     Args:
-        file: what is varied and what is kept of a run (.toml), see `cosim.sweep`.
+        file: what is varied and what is kept of a run (.toml), see `cosim_sweeps`.
         out: folder of the sweep; one that was begun there is continued.
         workers: processes; the cores of this machine where not given.
         cluster: address of a Dask scheduler that does the runs instead.

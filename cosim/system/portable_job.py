@@ -1,12 +1,15 @@
-"""A job with its files, for machines that do not have them."""
+"""A job with its files, for machines that do not have them: FMUs and recordings are sent to a cluster once."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, Protocol, Self, TypeVar
 
+from cosim.support.cluster import connected
 from cosim.support.files import cache_home, replacing
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
@@ -42,6 +45,28 @@ class PortableJob(Generic[J]):
         """Return the job with paths on this machine, where its files are put once."""
         here = {path: _stored(content, path.suffix) for path, content in self.files.items()}
         return self.job.with_scenario(_located(self.job.scenario, here))
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster that has a job: `threads` calls are done at a time."""
+
+    threads: int
+    executor: Executor
+    portable: Any
+    """The job where it is, a future of Dask."""
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Call a function of a module there, with the `PortableJob` as its first argument."""
+        return self.executor.submit(function, self.portable, *arguments)
+
+
+@contextmanager
+def on_cluster(job: WithScenario, address: str, close: Callable[[], None]) -> Iterator[Cluster]:
+    """Send a job to a cluster; `close` is called on each worker at the end, errors are those of `connected`."""
+    with connected(address, close) as (client, threads):
+        portable = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
+        yield Cluster(threads, client.get_executor(pure=False), portable)
 
 
 def files_of(scenario: Scenario) -> dict[str, Path]:

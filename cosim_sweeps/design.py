@@ -7,7 +7,8 @@ from math import prod
 
 import numpy as np
 
-from cosim.sweeps.variation import Value, Variation
+from cosim.system.address import Value
+from cosim_sweeps.variation import Variation
 
 Point = tuple[Value, ...]
 """Values of one run, in the order of the variations."""

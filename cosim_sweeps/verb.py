@@ -12,6 +12,8 @@ import typer
 from cosim.cli.options import Cluster, Out, command_of, default_out
 from cosim.support.terminal import messages, put, put_json, say, stage
 
+GROUP = "Simulate"
+EXAMPLES = ("cosim sweep gains.toml", "cosim sweep gains.toml --workers 4 --out gains")
 PAUSE = 10.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -27,8 +29,8 @@ def sweep(
 ) -> None:
     """Run a scenario many times; write DIR/table.parquet, a row a run, and DIR/sweep.svg, its picture."""
     out = out or default_out(file.stem)
-    from cosim.api.sweep import sweep as conduct
-    from cosim.sweeps.file import read_sweep
+    from cosim_sweeps.file import read_sweep
+    from cosim_sweeps.front import sweep as conduct
 
     title = f"{file.stem}: {read_sweep(file).design.runs:,} runs"
     command = command_of("sweep", [file], {"--out": out, "--cluster": cluster})
