@@ -2,12 +2,11 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import pyarrow as pa
 from pyarrow import parquet
@@ -22,7 +21,7 @@ from cosim.support.version import __version__
 from cosim.system.portable_job import files_of
 from cosim.system.scenario import Scenario
 from cosim_sweeps.file import Sweep
-from cosim_sweeps.runs import Job, Row, job_of, rehearse, rows_of
+from cosim_sweeps.runs import Job, job_of, rehearse, rows_of
 
 TABLE, PICTURE, RECORDINGS = "table.parquet", "sweep.svg", "recordings"
 MADE = ("sweep.json", RUNS, TABLE, PICTURE, RECORDINGS)
@@ -63,26 +62,18 @@ def conduct(
 ) -> Summary:
     """Run a sweep, or what is left of it, and write `out`/table.parquet.
 
-    Args:
-        sweep: what `read_sweep` returned.
-        scenario: the scenario it names, with an FMU for each component.
-        out: folder of the sweep; one that was begun there is continued.
-        workers: processes; the cores of this machine where not given.
-        address: of a Dask cluster that does the runs instead.
-        force: start over.
-        retry: run again what failed, crashed or took too long.
-        on_progress: called after each run.
-        command: what the table says it was made by.
+    `scenario` is the one that the sweep names, with an FMU for each component; `address` is that of a Dask cluster that
+    does the runs instead. Everything else is as of `cosim.sweep`.
 
     Raises:
         SweepError, WiringError, FmuError, SignalError: before the first run.
         OutputError: `out` holds another sweep.
     """
     processes = most_workers(workers, sweep.design.runs)
-    if sweep.record and address:
+    if sweep.settings.record and address:
         raise SweepError("record = true keeps files on this machine; it does not go with --cluster.", culprit="record")
     begun = perf_counter()
-    job = job_of(sweep, scenario, out / RECORDINGS if sweep.record else None)
+    job = job_of(sweep, scenario, out / RECORDINGS if sweep.settings.record else None)
     with ExitStack() as stack:
         stack.callback(close_cells)
         if not address:
@@ -92,7 +83,7 @@ def conduct(
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
         rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
         failed = sum(journal.rows[run]["status"] != "ok" for run in known)
-        table = stack.enter_context(_table(out, sweep, journal, units, _origin(sweep, scenario, command)))
+        stack.enter_context(_table(out / TABLE, sweep, journal, units, _origin(sweep, scenario, command)))
         rows = stack.enter_context(closing(rows_of(job, rest, processes, address)))
         for done, row in enumerate(rows, len(known) + 1):
             journal.append(row)
@@ -100,38 +91,26 @@ def conduct(
             on_progress(done, sweep.design.runs, failed)
         outside = [run for run, row in sorted(journal.rows.items()) if row["status"] == "ok" and row["reason"]]
         left = f"run {outside[0]}: {journal.rows[outside[0]]['reason']}" if outside else ""
-    return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table, len(outside), left)
+    seconds = perf_counter() - begun
+    return Summary(sweep.design.runs, len(rest), len(known), failed, seconds, out / TABLE, len(outside), left)
 
 
 @contextmanager
-def _table(out: Path, sweep: Sweep, journal: Journal, units: dict[str, str], origin: dict[str, str]) -> Iterator[Path]:
-    """Write the table of what is done when the block ends, however it ends."""
-    path = out / TABLE
+def _table(
+    path: Path, sweep: Sweep, journal: Journal, units: Mapping[str, str], origin: Mapping[str, str]
+) -> Iterator[None]:
+    """Write the table of what is done when the block ends, however it ends; what a failed run lacks is null."""
     try:
-        yield path
+        yield
     finally:
         rows = [row for _, row in sorted(journal.rows.items())]
-        _write(path, sweep.columns, rows, units, origin)
-
-
-def _write(
-    path: Path, columns: Sequence[str], rows: Sequence[Row], units: Mapping[str, str], origin: Mapping[str, Any]
-) -> None:
-    """Write the rows; numbers that a failed run does not have are null."""
-    fields = [pa.field(name, _type(name), metadata={UNIT_KEY: units.get(name, "").encode()}) for name in columns]
-    schema = pa.schema(fields, metadata={ORIGIN_KEY: json.dumps(dict(origin)).encode()})
-    arrays = [_array(one, [row[one.name] for row in rows]) for one in fields]
-    with replacing(path, force=True) as partial:
-        parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
-
-
-def _array(field: Any, values: Sequence[Any]) -> Any:
-    numbers = map(float, values) if field.type == pa.float64() else values
-    return pa.array(list(numbers), field.type, from_pandas=True)
-
-
-def _type(name: str) -> Any:
-    return TYPES.get(name, pa.float64())
+        told = {name: {UNIT_KEY: units.get(name, "").encode()} for name in sweep.columns}
+        fields = [pa.field(name, TYPES.get(name, pa.float64()), metadata=unit) for name, unit in told.items()]
+        columns = [[row[one.name] if one.name in TYPES else float(row[one.name]) for row in rows] for one in fields]
+        arrays = [pa.array(one, field.type, from_pandas=True) for one, field in zip(columns, fields, strict=True)]
+        schema = pa.schema(fields, metadata={ORIGIN_KEY: json.dumps(origin).encode()})
+        with replacing(path, force=True) as partial:
+            parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
 
 
 def _origin(sweep: Sweep, scenario: Scenario, command: str) -> dict[str, str]:

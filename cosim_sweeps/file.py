@@ -14,21 +14,20 @@ from cosim.support.errors import SweepError
 from cosim.support.numbers import Count, Seconds
 from cosim.support.plain import Parsed
 from cosim.support.toml import parsed
-from cosim_sweeps.design import Design, grid, latin_hypercube, monte_carlo
 from cosim_sweeps.statistics import Statistic
-from cosim_sweeps.variation import LIMIT, Variation, kind_of
+from cosim_sweeps.variation import LIMIT, Design, Variation, drawn, grid, kind_of
 
 OWN = ("run", "seconds", "status", "reason")
 """Columns of every table."""
-
-
 KEPT = (
     ' It says what is kept of each run, for example: [statistics] error = { signal = "q_d", minus = "q", kind = "rms" }'
 )
 """What to write where nothing is kept."""
 
 
-class _File(BaseModel):
+class Settings(BaseModel):
+    """The file as it is written."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     scenario: str
@@ -48,19 +47,24 @@ class Sweep:
 
     path: str
     scenario: str
-    method: str
     variations: Mapping[str, Variation]
     design: Design
-    statistics: Mapping[str, Statistic]
-    decimation: int | None
-    timeout: float | None
-    record: bool
-    content: str
+    settings: Settings
+
+    @property
+    def statistics(self) -> Mapping[str, Statistic]:
+        """What is kept of a run, by name."""
+        return self.settings.statistics
+
+    @property
+    def content(self) -> str:
+        """The file as JSON, its defaults written out."""
+        return json.dumps(self.settings.model_dump(mode="json", by_alias=True))
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the table's columns."""
-        return ("run", *self.variations, *self.statistics, "seconds", "status", "reason")
+        return (OWN[0], *self.variations, *self.statistics, *OWN[1:])
 
     def fits(self, row: Parsed) -> bool:
         """Whether a row read from a file is one of this sweep: its columns, a run that there is, words and numbers."""
@@ -78,7 +82,7 @@ def read_sweep(path: Path) -> Sweep:
         SweepError: one sentence that names file, key, value and rule.
     """
     try:
-        raw = _File.model_validate(parsed(path.read_text("utf-8")))
+        raw = Settings.model_validate(parsed(path.read_text("utf-8")))
     except OSError as error:
         raise SweepError(f"{path}: no such sweep; a sweep is a .toml file.", culprit=str(path)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -89,19 +93,9 @@ def read_sweep(path: Path) -> Sweep:
         raise SweepError(**said) from error
     variations = {name: _variation(name, given, path) for name, given in raw.vary.items()}
     _check_names(path, variations, raw.statistics)
-    beside = path.parent / raw.scenario
-    return Sweep(
-        path=str(path),
-        scenario=str(beside) if beside.is_file() else raw.scenario,
-        method=raw.method,
-        variations=variations,
-        design=_design(raw, variations, path),
-        statistics=raw.statistics,
-        decimation=raw.decimation,
-        timeout=raw.timeout,
-        record=raw.record,
-        content=json.dumps(raw.model_dump(mode="json", by_alias=True)),
-    )
+    scenario = path.parent / raw.scenario
+    known = str(scenario) if scenario.is_file() else raw.scenario
+    return Sweep(str(path), known, variations, _design(raw, variations, path), raw)
 
 
 def _variation(name: str, given: Any, path: Path) -> Variation:
@@ -121,51 +115,37 @@ def _check_names(path: Path, variations: Mapping[str, Variation], statistics: Ma
             raise SweepError(f"{path}: statistics.{name}: choose another name; {taken}.", culprit=name)
     for name in variations:
         if name in OWN:
-            raise SweepError(
-                f"{path}: vary.{name}: every table has a column of this name; choose another.", culprit=name
-            )
+            text = f"{path}: vary.{name}: every table has a column of this name; choose another."
+            raise SweepError(text, culprit=name)
     targets = [target for variation in variations.values() for target in variation.of]
     twice = next((target for target in targets if targets.count(target) > 1), None)
     if twice:
         raise SweepError(f'{path}: "{twice}" is varied twice; once is enough.', culprit=twice)
 
 
-def _design(raw: _File, variations: Mapping[str, Variation], path: Path) -> Design:
+def _design(raw: Settings, variations: Mapping[str, Variation], path: Path) -> Design:
     every = tuple(variations.values())
     if raw.method == "grid":
-        _check_grid(raw, variations, path)
+        if raw.runs is not None:
+            rule = 'does not go with method = "grid", whose counts say how many there are'
+            raise SweepError(f"{path}: runs = {raw.runs} {rule}.", culprit="runs", value=raw.runs)
+        if empty := [name for name, one in variations.items() if not one.grid()]:
+            rule = "a grid needs a list of values, or low, high and count"
+            raise SweepError(f"{path}: vary.{empty[0]} has no points: {rule}.", culprit=empty[0])
         design = grid(every)
-    elif raw.runs is None:
-        raise SweepError(f'{path}: method = "{raw.method}" needs runs, how many points are drawn.', culprit="runs")
     else:
-        _check_drawn(raw, variations, path)
-        draw = latin_hypercube if raw.method == "latin_hypercube" else monte_carlo
-        design = draw(every, raw.runs, raw.seed)
+        if raw.runs is None:
+            raise SweepError(f'{path}: method = "{raw.method}" needs runs, how many points are drawn.', culprit="runs")
+        if counted := [name for name, one in variations.items() if getattr(one, "count", None) is not None]:
+            rule = f'belongs to a grid; method = "{raw.method}" draws as many as runs says'
+            raise SweepError(f"{path}: vary.{counted[0]}.count {rule}.", culprit=counted[0])
+        design = drawn(every, raw.runs, raw.seed, latin=raw.method == "latin_hypercube")
     if design.runs > LIMIT:
         message = f"{path} asks for {design.runs:,} runs; {LIMIT:,} is the most of one sweep."
         raise SweepError(message, culprit=str(path), value=design.runs)
     return design
 
 
-def _check_grid(raw: _File, variations: Mapping[str, Variation], path: Path) -> None:
-    if raw.runs is not None:
-        message = f'{path}: runs = {raw.runs} does not go with method = "grid", whose counts say how many there are.'
-        raise SweepError(message, culprit="runs", value=raw.runs)
-    for name, variation in variations.items():
-        if not variation.grid():
-            rule = "a grid needs a list of values, or low, high and count"
-            raise SweepError(f"{path}: vary.{name} has no points: {rule}.", culprit=name)
-
-
-def _check_drawn(raw: _File, variations: Mapping[str, Variation], path: Path) -> None:
-    for name, variation in variations.items():
-        if getattr(variation, "count", None) is not None:
-            message = (
-                f'{path}: vary.{name}.count belongs to a grid; method = "{raw.method}" draws as many as runs says.'
-            )
-            raise SweepError(message, culprit=name)
-
-
 def _keys(location: Location) -> tuple[str, ...]:
-    section = Statistic if location[0] == "statistics" and len(location) > 1 else _File
+    section = Statistic if location[0] == "statistics" and len(location) > 1 else Settings
     return tuple(field.alias or name for name, field in section.model_fields.items())

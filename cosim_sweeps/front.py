@@ -11,7 +11,7 @@ from cosim.support.notebook import shows_progress
 from cosim.system.scenario import read_scenario
 from cosim_sweeps.conduct import PICTURE, Summary, conduct
 from cosim_sweeps.file import read_sweep
-from cosim_sweeps.picture import Results, draw, figure_of, read_results
+from cosim_sweeps.results import Results, read_results
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class SweepResult:
 
     def plot(self) -> Any:
         """Return the picture as a matplotlib figure."""
+        from cosim_sweeps.picture import figure_of
+
         return figure_of(self.results)
 
     def __str__(self) -> str:
@@ -52,7 +54,8 @@ class SweepResult:
         failed = f"; {done.failed:,} came to nothing, the table says why" if done.failed else ""
         left = f"{done.outside:,} runs left what is proven; {done.left}\n" if done.outside else ""
         how = f"{done.runs:,} runs{before}, {done.seconds:.3g} s{failed}; picture: {self.picture}"
-        return f"{_best(self.results)}{left}{how}"
+        best = f"{words}\n" if (words := self.results.best_words) else ""
+        return f"{best}{left}{how}"
 
     def __repr__(self) -> str:
         return f"SweepResult({self.summary.runs:,} runs, table={str(self.table)!r})"
@@ -103,19 +106,6 @@ def sweep(
         on_progress=on_progress,
         command=command,
     )
+    from cosim_sweeps.picture import draw  # what draws takes long to load
+
     return SweepResult(done, draw(done.table, done.table.with_name(PICTURE)))
-
-
-def _best(results: Results) -> str:
-    """Say which run is the best, and at which numbers; "" where none has a result."""
-    row = results.best_row()
-    if not row:
-        return ""
-    first = next(iter(results.statistics))
-    at = ", ".join(f"{name} = {row[name]:.4g}{_unit(results, name)}" for name in results.varied)
-    return f"best by {first}: run {row['run']:.0f} with {row[first]:.4g}{_unit(results, first)} at {at}\n"
-
-
-def _unit(results: Results, name: str) -> str:
-    unit = results.units.get(name, "")
-    return "" if unit in ("", "1") else f" {unit}"

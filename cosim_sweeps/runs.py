@@ -18,9 +18,9 @@ from cosim.system.address import Address, addresses, find
 from cosim.system.portable_job import PortableJob, on_cluster
 from cosim.system.scenario import Scenario
 from cosim.system.wire import Record
-from cosim_sweeps.design import Point
 from cosim_sweeps.file import Sweep
 from cosim_sweeps.statistics import Statistic
+from cosim_sweeps.variation import Point
 
 Numbered = tuple[int, Point]
 """A point and the number of its run."""
@@ -75,8 +75,8 @@ def job_of(sweep: Sweep, scenario: Scenario, recordings: Path | None = None) -> 
     wanted = dict.fromkeys(name for statistic in sweep.statistics.values() for name in statistic.signals)
     watched = {name: scenario.records.get(name) or Record(name) for name in wanted}
     kept = dict(scenario.records) if recordings else {}
-    changed = replace(scenario, records=kept | watched, decimation=sweep.decimation or scenario.decimation)
-    return Job(changed, varied, sweep.statistics, sweep.timeout, recordings, tuple(kept))
+    changed = replace(scenario, records=kept | watched, decimation=sweep.settings.decimation or scenario.decimation)
+    return Job(changed, varied, sweep.statistics, sweep.settings.timeout, recordings, tuple(kept))
 
 
 def work(job: Job, number: int, point: Point) -> Row:

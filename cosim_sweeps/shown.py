@@ -13,7 +13,7 @@ from cosim.support.errors import InputError
 from cosim.support.plain import Json
 from cosim_sweeps.conduct import PICTURE
 from cosim_sweeps.file import read_sweep
-from cosim_sweeps.picture import Results, read_results
+from cosim_sweeps.results import Results, read_results
 
 FIRST = 20
 """Runs that are listed, the best first."""

@@ -77,7 +77,8 @@ class Statistic(BaseModel):
             raise SweepError(message, culprit=self.signal, value=self.begin)
         x = recording[self.signal][inside]
         if self.minus:
-            x = x - self._converted(recording, self.minus, inside, recording.units.get(self.signal, ""))
+            ours, shift = self._conversion(recording, self.minus, recording.units.get(self.signal, ""))
+            x = x - (ours * recording[self.minus][inside] + shift)
         gain, offset = self._conversion(recording, self.signal, self.unit)
         # A difference has no offset: 3 K more are 3 degC more.
         return KINDS[self.kind](gain * x + (0.0 if self.minus else offset), dt)
@@ -95,11 +96,6 @@ class Statistic(BaseModel):
         unit = self.unit or recording.units.get(self.signal, "")
         power = POWERS.get(self.kind, "")
         return f"({unit}){power}" if power and not unit.isalpha() else f"{unit}{power}"
-
-    def _converted(self, recording: Recording, name: str, rows: slice, unit: str) -> np.ndarray:
-        gain, offset = self._conversion(recording, name, unit)
-        converted: np.ndarray = gain * recording[name][rows] + offset
-        return converted
 
     def _conversion(self, recording: Recording, name: str, unit: str) -> tuple[float, float]:
         try:

@@ -1,4 +1,4 @@
-"""How a parameter varies: values, a range, a normal distribution, each an inverse distribution function.
+"""How parameters vary, each by an inverse distribution function, and which points of their space are run.
 
     "controller.kp" = [100.0, 225.0, 400.0]                       these values, equally likely
     "controller.kp" = { low = 100.0, high = 400.0, count = 4 }    evenly; scale = "log" or "integer"
@@ -9,14 +9,20 @@ The key is the parameter, or any name where `of` lists the parameters that all t
 """
 
 from abc import abstractmethod
-from math import exp, floor, inf, isfinite, log
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import exp, floor, inf, isfinite, log, prod
 from statistics import NormalDist
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.system.address import Value
 
+Point = tuple[Value, ...]
+"""Values of one run, in the order of the variations."""
 LIMIT = 1_000_000
 """Most runs of one sweep."""
 
@@ -128,3 +134,35 @@ def kind_of(given: Any) -> type[Variation]:
     """Tell by its keys which kind of variation is meant."""
     keys = set(given) if isinstance(given, dict) else {"values"}
     return Values if "values" in keys else Normal if keys & {"mean", "std"} else Range
+
+
+@dataclass(frozen=True)
+class Design:
+    """A countable set of points; `points` yields them in the order of their numbers."""
+
+    runs: int
+    points: Callable[[], Iterator[Point]]
+
+
+def grid(variations: Sequence[Variation]) -> Design:
+    """Every combination; the last one varies fastest."""
+    axes = [variation.grid() for variation in variations]
+    return Design(prod(map(len, axes)), lambda: product(*axes))
+
+
+def drawn(variations: Sequence[Variation], runs: int, seed: int, latin: bool) -> Design:
+    """Independent draws, or a Latin hypercube; a seed repeats them.
+
+    A hypercube cuts each range into as many equally likely parts as there are runs, and meets each part once.
+    Reference: McKay, Beckman, Conover, Technometrics 21 (1979) 239.
+    """
+
+    def points() -> Iterator[Point]:
+        random, count = np.random.default_rng(seed), len(variations)
+        if latin:
+            shares = np.stack([(random.permutation(runs) + random.random(runs)) / runs for _ in range(count)], axis=1)
+        else:
+            shares = random.random((runs, count))
+        return (tuple(one.at(u) for one, u in zip(variations, row, strict=True)) for row in shares.tolist())
+
+    return Design(runs, points)

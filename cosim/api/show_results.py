@@ -5,15 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.api.show_exchange import calibration, checked
 from cosim.support.errors import InputError
 from cosim.support.plain import Json, Parsed
 from cosim.support.plugins import RESULTS, loaded, names
 
 Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN = "diagnosis.json", "run.json"
-COMPARISON, PROOF = "compare.json", "proof.json"
-IDENTIFIED, CHECK = "identified.json", "check.json"
+COMPARISON, CHECK = "compare.json", "check.json"
 
 
 def result(path: Path) -> Shown | None:
@@ -45,7 +43,12 @@ def _read_result(path: Path, may_be_foreign: bool = False) -> Shown | None:
         raise InputError(text, culprit=str(path)) from error
 
 
-def _document(path: Path, *keys: str) -> Parsed:
+def document_of(path: Path, *keys: str) -> Parsed:
+    """Read a JSON object.
+
+    Raises:
+        InputError: it cannot be read, or lacks a key.
+    """
     try:
         document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -59,7 +62,7 @@ def _document(path: Path, *keys: str) -> Parsed:
 def _diagnosis(path: Path) -> Shown:
     from cosim.diagnosis.answer.names import with_names
 
-    document = _document(path, "verdict", "effects", "heldout")
+    document = document_of(path, "verdict", "effects", "heldout")
     held = document["heldout"]
     facts: dict[str, Json] = {
         "diagnosis": str(path),
@@ -89,7 +92,7 @@ def _short(held: Mapping[str, Any], name: str) -> str:
 
 
 def _run(path: Path) -> Shown:
-    document = _document(path, "steps", "seconds")
+    document = document_of(path, "steps", "seconds")
     facts: dict[str, Json] = {"run": str(path.parent), "scenario": str(document.get("scenario", ""))}
     tracked = [str(one["statement"]) for one in document.get("tracking", ()) if "statement" in one]
     facts |= {f"tracking {k}" if tracked[1:] else "tracking": text for k, text in enumerate(tracked, 1)}
@@ -100,13 +103,13 @@ def _run(path: Path) -> Shown:
     return facts | dict(found), {}
 
 
-def _rounded(value: Json) -> Json:
+def rounded(value: Json) -> Json:
     """A number as it is read; what is none as it is."""
     return float(f"{value:.4g}") if isinstance(value, float) else value
 
 
 def _comparison(path: Path) -> Shown:
-    document = _document(path, "recordings", "span", "rows", "differences")
+    document = document_of(path, "recordings", "span", "rows", "differences")
     first = str(document["recordings"][0])
     facts: dict[str, Json] = {
         "comparison": str(path),
@@ -115,38 +118,37 @@ def _comparison(path: Path) -> Shown:
     }
     page = path.with_name("compare.html")
     facts |= {"open": str(page)} if page.is_file() else {}
-    names = ("column", "other", "unit", "rms", "largest", "at")
-    rows = [{name: _rounded(one[name]) for name in names} for one in document["differences"]]
+    told = ("column", "other", "unit", "rms", "largest", "at")
+    rows = [{name: rounded(one[name]) for name in told} for one in document["differences"]]
     return facts, {f"differences from {first}": rows}
 
 
-def _proof(path: Path) -> Shown:
-    document = _document(path, "played", "cases", "scores", "command")
-    facts: dict[str, Json] = {
-        "blind benchmark": str(path),
-        "cases": f"{document['played']} of {document['cases']}, seed {document['seed']}",
-        "made by": str(document["command"]),
-    }
-    page = path.with_name("README.md")
-    facts |= {"read": str(page)} if page.is_file() else {}
-    names = {"score": "title", "value": "value", "from": "low", "to": "high", "cases": "n", "target": "asked"}
-    rows = [{name: _rounded(one.get(key)) for name, key in names.items()} for one in document["scores"]]
-    return facts, {"scores, with 95 % ranges": rows}
-
-
-def _calibration(path: Path) -> Shown:
-    return calibration(path, _document(path, "source", "numbers", "outputs", "heldout"))
-
-
 def _check(path: Path) -> Shown:
-    return checked(path, _document(path, "fmu", "passed", "experiments", "findings"))
+    document = document_of(path, "fmu", "passed", "experiments", "findings")
+    words = {True: "pass", False: "FAIL"}
+    facts: dict[str, Json] = {"check": str(path), "of": str(document["fmu"]), "result": words[document["passed"]]}
+    facts |= {one["name"]: f"{words[one['passed']]}: {one['statement']}" for one in document["findings"]}
+    rows: list[Mapping[str, Json]] = [
+        {
+            "experiment": each["name"],
+            "variable": one["variable"],
+            "": words[one["passed"]],
+            "largest difference": "" if one["largest"] is None else f"{one['largest']:.4g}",
+            "allowed": "" if one["allowed"] is None else f"{one['allowed']:.4g}",
+            "at [s]": "" if one["at"] is None else f"{one['at']:g}",
+            "cause": one["cause"] or "",
+        }
+        for each in document["experiments"]
+        for one in each["variables"]
+    ]
+    silent = [one for one in document["experiments"] if not one["variables"]]
+    facts |= {f"experiment {one['name']}": f"{words[one['passed']]}: {one['reason'] or 'ran'}" for one in silent}
+    return facts, {"variables": rows} if rows else {}
 
 
 _READERS: dict[str, Callable[[Path], Shown]] = {
     DIAGNOSIS: _diagnosis,
     RUN: _run,
     COMPARISON: _comparison,
-    PROOF: _proof,
-    IDENTIFIED: _calibration,
     CHECK: _check,
 }

@@ -173,7 +173,8 @@ def test_force_removes_what_a_sweep_made_and_nothing_else(folder: Path) -> None:
     (folder / "out" / "notes.txt").write_text("mine")
     run(written(folder, ("[vary]", "record = true\n[vary]")))
     assert len(list((folder / "out" / "recordings").iterdir())) == 9
-    run(folder / "sweep.toml", force=True)
+    run(written(folder), force=True)
+    assert not (folder / "out" / "recordings").exists()
     assert (folder / "out" / "notes.txt").read_text() == "mine"
     (folder / "out" / "sweep.json").unlink()
     with pytest.raises(OutputError, match="exists already; give --force"):

@@ -1,15 +1,14 @@
-"""What calibrations and checks of FMUs wrote, on one screen."""
+"""What `cosim show` tells of a calibration."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from cosim.api.show_results import Shown, document_of
 from cosim.support.plain import Json, Parsed
 
-Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 
-
-def calibration(path: Path, document: Parsed) -> Shown:
+def of_identified(path: Path) -> Shown:
     """Tell what `identify --fmu` or `--system` found: numbers, what is not determined, errors of the outputs."""
+    document = document_of(path, "source", "numbers", "outputs", "heldout")
     facts: dict[str, Json] = {"calibration": str(path), "of": str(document["source"]["name"])}
     facts |= {f"note {k}": str(note) for k, note in enumerate(document.get("notes", ()), 1)}
     for kind in ("report", "fmu", "parameter_set"):
@@ -39,26 +38,3 @@ def _errors(output: str, one: Parsed) -> dict[str, Json]:
         "after": f"{one['after_rms']:.3g}",
         "unit": str(one["unit"]),
     }
-
-
-def checked(path: Path, document: Parsed) -> Shown:
-    """Tell what `check` found: experiments with their variables, and what was looked at beside."""
-    words = {True: "pass", False: "FAIL"}
-    facts: dict[str, Json] = {"check": str(path), "of": str(document["fmu"]), "result": words[document["passed"]]}
-    facts |= {one["name"]: f"{words[one['passed']]}: {one['statement']}" for one in document["findings"]}
-    rows: list[Mapping[str, Json]] = [
-        {
-            "experiment": each["name"],
-            "variable": one["variable"],
-            "": words[one["passed"]],
-            "largest difference": "" if one["largest"] is None else f"{one['largest']:.4g}",
-            "allowed": "" if one["allowed"] is None else f"{one['allowed']:.4g}",
-            "at [s]": "" if one["at"] is None else f"{one['at']:g}",
-            "cause": one["cause"] or "",
-        }
-        for each in document["experiments"]
-        for one in each["variables"]
-    ]
-    silent = [one for one in document["experiments"] if not one["variables"]]
-    facts |= {f"experiment {one['name']}": f"{words[one['passed']]}: {one['reason'] or 'ran'}" for one in silent}
-    return facts, {"variables": rows} if rows else {}
