@@ -126,8 +126,8 @@ def without_denied(sanity: Sequence[Sanity], chosen: Fit, beside: Stage) -> tupl
     tried beside it.
     """
     gained = [one for one in beside.tried if one.evidence > 0 and hypothesis_of(one.effect).is_timing]
-    timing = [one for one in chosen.mount.effects if hypothesis_of(one).is_timing]
-    timing += [one.fit.mount.effects[-1] for one in gained]
+    fits = [chosen, *(one.fit for one in gained)]
+    timing = [one for fit in fits for one in fit.mount.effects if hypothesis_of(one).is_timing]
     lags = [abs(float(getattr(one, one.main.parameter)) / 1e3) for one in timing]  # they count in milliseconds
     return tuple(sanity) if max(lags, default=0.0) >= LATE / 2 else beyond_denial(sanity)
 

@@ -116,10 +116,10 @@ CLOCKS = Sanity(finding="clocks", statement="late", blocks_naming=True)
 SIGN = Sanity(finding="torque_sign", statement="turned", blocks_naming=True)
 
 
-LATE_BY_20 = Delay(delay_ms=20.0)
+LATE_BY_20, OFFSET = Delay(delay_ms=20.0), TorqueOffset(torque=20.0)
 LAGS = [((LATE_BY_20,), ()), ((ClockSkew(offset_ms=-20.0, drift_ppm=0.0),), ()), ((), (LATE_BY_20, 3.0))]
-NONE = [((), ()), ((TorqueOffset(torque=1.0),), ()), ((Delay(delay_ms=2.0),), ())]
-NONE += [((), (LATE_BY_20, -1.0)), ((), (TorqueOffset(torque=20.0), 50.0))]
+NONE = [((), ()), ((OFFSET,), ()), ((Delay(delay_ms=2.0),), ())]
+NONE += [((), (LATE_BY_20, -1.0)), ((), (OFFSET, 50.0))]
 
 
 @pytest.mark.parametrize(("chosen", "beside"), [*LAGS, *NONE])
@@ -129,7 +129,8 @@ def test_a_lag_stays_where_the_model_wants_one(chosen: tuple[Effect, ...], besid
     def fitted(*effects: Effect) -> Any:
         return SimpleNamespace(mount=axis(effects=effects))
 
-    tried = [SimpleNamespace(effect=beside[0], fit=fitted(beside[0]), evidence=beside[1])] if beside else []
+    fit = fitted(*beside[:1], OFFSET)
+    tried = [SimpleNamespace(effect=beside[0], fit=fit, evidence=beside[1])] if beside else []
     left = without_denied((CLOCKS, SIGN), fitted(*chosen), SimpleNamespace(tried=tuple(tried)))
     assert left == ((CLOCKS, SIGN) if (chosen, beside) in LAGS else (SIGN,))
 
