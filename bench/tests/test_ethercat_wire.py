@@ -15,7 +15,7 @@ sys.path[:0] = [str(Path(__file__).parents[2] / "tests" / one) for one in ("tool
 
 from mortal import mortal  # noqa: E402
 from on_hardware import assert_safe, recorded  # noqa: E402
-from test_ethercat import RATED, machine, session  # noqa: E402
+from test_adapters import RATED, machine, session  # noqa: E402
 
 from cosim.hardware.replay import replay  # noqa: E402
 from cosim.hardware.session import run_session  # noqa: E402
