@@ -73,7 +73,7 @@ def test_a_constant_is_looked_for_where_it_is_named_and_a_c_function_where_it_is
     source = path.read_text("utf-8")
     line = source[: source.index("\nLEAST_SECONDS = ")].count("\n") + 2
     nearest = next(candidates(path, source, line))
-    assert nearest == {f"cosim/diagnosis/trust/admission.py:_check_length:{number}" for number in (0, 1)}
+    assert nearest == {f"cosim/diagnosis/trust/admission.py:check_recordings:{number}" for number in (0, 2)}
     assert {"factorise", "prepare"} < reaching(HOME / "cosim/master/loop/rodas4.c", "factorise")
     assert mutants_chosen.naming_blocks("loop_run")
     for folder in ("cosim_nesting/c", "pyfmi_models/export/c", "cosim/hardware"):
