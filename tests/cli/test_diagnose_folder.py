@@ -17,7 +17,7 @@ from waiting import until
 
 import cosim
 from cosim.api.machine_work import Options, Order
-from cosim.api.machines import JOURNAL, machines_in
+from cosim.api.machines import JOURNAL, MachineResult, machines_in
 from cosim.support.errors import InputError, SweepError
 
 LEVELS = {"north": 2.0, "south": 3.0}
@@ -138,3 +138,11 @@ def test_results_among_the_recordings_are_no_machine(fleet: Path) -> None:
     (fleet / "all" / "found" / JOURNAL).touch()
     write(fleet / "all" / "found" / "run.csv", 1.0, 1)
     assert [one.name for one in machines_in(fleet / "all")] == sorted(LEVELS)
+
+
+@pytest.mark.parametrize(("verdict", "said"), [([], "nothing missing"), (["backlash", "delay"], "backlash, delay")])
+def test_the_line_of_a_machine_names_what_is_missing(verdict: list[str], said: str) -> None:
+    errors = {"before_rms": 2.0, "after_rms": 1.0, "floor_rms": 0.9}
+    one = MachineResult("north", Path("out"), {"heldout": errors, "verdict": verdict})
+    assert str(one) == f"north: {said}; validation RMS 2 -> 1 (noise 0.9); out"
+    assert not one.earlier

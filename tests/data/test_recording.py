@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from tables import written
 
 from cosim.data.recording import Recording
-from cosim.data.set_points import PIECE
+from cosim.data.set_points import PIECE, Star
 from cosim.data.signals import (
     Chirp,
     Generator,
@@ -250,6 +250,8 @@ def test_programmes_rest_step_and_turn_when_they_say() -> None:
     np.testing.assert_allclose(position, 0.5 + SIDEREAL_RATE * STEP * np.arange(30_000), atol=1e-15)
     smooth = values(Sidereal(kind="sidereal", start=0.5, smooth_start=1.0))
     np.testing.assert_array_equal(smooth[:, 0], [0.5, 0.0, 0.0])
+    star = values(Star(kind="star", latitude_deg=49.0, declination_deg=30.0), ticks=1)
+    np.testing.assert_allclose(star[3:5, 0], [np.deg2rad(90 - 49 + 30), 0.0], atol=1e-12)  # it culminates at the start
 
 
 @pytest.mark.parametrize(("ticks", "chunk"), [(1000, 7), (2 * PIECE + 5, 9000)])

@@ -94,7 +94,9 @@ def test_where_polls_are_uneven_the_band_ends_where_lines_bridge_the_steps() -> 
 def test_speeds_are_right_where_time_steps_jitter_to_one_side() -> None:
     t, q, v, a = wander()
     late = t + 0.4 * (t[1] - t[0]) * (np.arange(len(t)) % 3 == 0)
-    piece = prepare([recorded(5 * a, late, np.interp(late, t, q))], 20.0).pieces[0]
+    read = recorded(5 * a, late, np.interp(late, t, q))
+    assert any("interpolated to an even grid" in said for said in quality(read, 20.0))
+    piece = prepare([read], 20.0).pieces[0]
     moving = piece.inside & (np.abs(piece.v) > 0.05)
     assert np.median(piece.v[moving] / np.interp(piece.t[moving], t, v)) == pytest.approx(1, abs=2e-3)
 
