@@ -16,11 +16,14 @@ from fmpy import read_model_description
 from measured_like import read
 from wandering import axis, recorded, wander
 
+from cosim.data.signals import Sine
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.measure.experiment import Experiment, Visited
 from cosim.diagnosis.measure.protocol import Structures, judge, traces
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import Band, prepare
 from cosim.support.errors import InputError
+from cosim.system.scenario import read_scenario
 from cosim_studies.proof.demo import demo_case
 from cosim_studies.proof.generator import write_case
 from pyfmi_models.card import parse_card, read_card
@@ -82,9 +85,12 @@ def valid(told: Any) -> Any:
     return told
 
 
-def test_a_diagnosis_writes_json_page_torques_and_an_improved_card(
-    folder: Path, tmp_path: Path, capsys: Printed
+def test_a_diagnosis_writes_json_page_torques_an_improved_card_and_the_next_experiment(
+    folder: Path, tmp_path: Path, capsys: Printed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    sine = Sine(kind="sine", frequency=0.1, amplitude=0.2)
+    ordered = Experiment("a slow sine", sine, 0.3, ("cogging", "backlash"), Visited(0.4, 0.3, 0.2, 0.1, 5.0, 30.0))
+    monkeypatch.setattr("cosim.diagnosis.diagnose._experiment", lambda _: ordered)
     out = tmp_path / "out"
     assert asked(folder, out, "--json") == 0
     printed = valid(json.loads(capsys.readouterr().out))
@@ -101,6 +107,7 @@ def test_a_diagnosis_writes_json_page_torques_and_an_improved_card(
     assert improved.origin["recordings"][0]["sha256"]
     rows = [pq.read_table(folder / f"{name}.parquet").num_rows for name in ("train_1", "train_2", "heldout")]
     assert pq.read_table(out / "missing_torque.parquet").num_rows == sum(rows)
+    assert read_scenario(out / printed["next_experiment"]["scenario"]).signals["reference"] == sine
     page = (out / "report.html").read_text()
     assert "not passive" in printed["data_quality"][0]
     assert "Notes on the card, the recordings and the search" in page
