@@ -192,6 +192,7 @@ def test_a_log_range_has_its_middle_at_the_geometric_mean_and_a_grid_ends_at_its
     assert Range(of=("x",), low=0.1, high=30.0, scale="log", count=3).grid() == (0.1, pytest.approx(sqrt(3.0)), 30.0)
     assert Range(of=("x",), low=1.0, high=2.0, count=1).grid() == (1.0,)
     assert Range(of=("x",), low=1.0, high=4.0, scale="integer").grid() == (1.0, 2.0, 3.0, 4.0)
+    assert Range(of=("x",), low=1.0, high=4.0, scale="integer", count=9).grid() == (1.0, 2.0, 3.0, 4.0)
 
 
 def test_a_latin_hypercube_meets_each_part_of_each_range_once(folder: Path) -> None:
