@@ -63,6 +63,14 @@ def test_nested_systems_are_flat_and_their_transformations_chain(read) -> None:
     np.testing.assert_array_equal(recording["result"], recording["last.y"])
 
 
+def test_a_value_from_outside_goes_through_every_link_on_its_way_in(read) -> None:
+    into = wire("in", "one.a", linear(offset=1))
+    inner = system(component("one", FOLLOWS), into, name="sub", connectors=connector("in", "input"))
+    wires, given = wire("outside", "sub.in", linear(factor=2)), values(real("outside", 5))
+    outer = system(inner, wires, connectors=connector("outside", "input"), bindings=given)
+    np.testing.assert_allclose(run(read(outer)).recording["sub/one.y"][2:], 5 * 2 + 1)
+
+
 def test_outer_and_later_bindings_win_and_prefixes_and_mappings_rename(read) -> None:
     scaled = mapped(values(real("gain", 3)), ("gain", "k"), inside=linear(factor=2, offset=1))
     one = component("one", values(real("k", 1)) + scaled)
