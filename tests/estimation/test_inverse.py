@@ -11,7 +11,6 @@ from friction_laws import EXAMPLES as LAWS
 from friction_laws import WITH_MEMORY, numeric
 from wandering import axis, recorded, swing, wander
 
-from cosim.diagnosis.trust.admission import is_held
 from cosim.estimation.equations import _late
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
@@ -36,7 +35,7 @@ from pyfmi_models.friction import FrictionLaw, LuGre, Stribeck
 from pyfmi_models.friction.lugre_passive import PassiveLuGre
 from pyfmi_models.mount import Mount
 
-HELD = [one for one in EXAMPLES if is_held(one)]
+HELD = [one for one in EXAMPLES if one.is_determined]
 EXACT = [one for one in HELD if not isinstance(one, Backlash)]
 
 

@@ -137,7 +137,7 @@ def test_our_c_compiles_without_a_warning():
 
 def test_an_unchanged_model_is_only_looked_up(monkeypatch):
     built = build_library(models.lugre())
-    monkeypatch.setattr(build, "_build", None)
+    monkeypatch.setattr(build, "_compile", None)
     assert build_library(models.lugre()) == built
 
 

@@ -4,6 +4,7 @@ mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b
 From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns,
 13 prints a line and goes on, 14 ends the process with exit code 0, 15 aborts, 16 starts a process that stays,
 17 asks to end the simulation, 18 returns early from its step (FMI 3).
+After a step that was said to be final (noSetFMUStatePriorToCurrentPoint) its state cannot be restored.
 """
 
 import zipfile
@@ -14,7 +15,7 @@ from compiling import compiled, packed, with_stubs
 
 SOURCE = r"""
 enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER, LEAVE, ABORT, SPAWN, END, EARLY };
-typedef struct { double v[COUNT]; char name[99]; void *log; } M;
+typedef struct { double v[COUNT]; char name[99]; void *log; int final; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
 static M *make(void) {
@@ -29,6 +30,7 @@ static int get(M *m, const unsigned *r, size_t n, double *x) {
   return 0;
 }
 static int save(M *m, M **s) { if (!*s) *s = make(); **s = *m; return 0; }
+static int restore(M *m, M *s) { if (m->final) return 3; *m = *s; m->final = 0; return 0; }
 static int step(M *m, double t, double h) {
   double e = m->v[K] * (m->v[A] - m->v[B]);
   m->v[Y] = m->v[MODE] > 0 ? e : m->v[Y] + h * e;
@@ -52,15 +54,15 @@ API int fmi2Terminate(void *m) { return noted('T'); }
 API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; strcpy(n->name, m->name); *m = *n; free(n); return 0; }
 API void fmi2FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi2GetFMUstate(M *m, M **s) { return save(m, s); }
-API int fmi2SetFMUstate(M *m, M *s) { *m = *s; return 0; }
+API int fmi2SetFMUstate(M *m, M *s) { return restore(m, s); }
 API int fmi2FreeFMUstate(M *m, M **s) { free(*s); *s = NULL; return 0; }
 API int fmi3GetFMUState(M *m, M **s) { return save(m, s); }
-API int fmi3SetFMUState(M *m, M *s) { *m = *s; return 0; }
+API int fmi3SetFMUState(M *m, M *s) { return restore(m, s); }
 API int fmi3FreeFMUState(M *m, M **s) { free(*s); *s = NULL; return 0; }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
 API int fmi2DoStep(M *m, double t, double h, int p) {
-  int s = step(m, t, h); if (s == END) return 2;
+  m->final = p; int s = step(m, t, h); if (s == END) return 2;
   if (s) ((Log2 *)m->log)(NULL, m->name, 3, "error", "the %s broke", "shaft"); return s; }
 API int fmi2GetBooleanStatus(M *m, int kind, int *value) {
   return *value = kind == 3 && m->v[STATUS] == END, m->v[STATUS] == END ? 0 : 3; }
@@ -72,7 +74,7 @@ API void fmi3FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
-  int s = step(m, t, h); if (s == END) return *x = true, 0;
+  m->final = p; int s = step(m, t, h); if (s == END) return *x = true, 0;
   if (s == EARLY) return *y = true, *l = t + h / 2, 0;
   if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
 """
