@@ -83,19 +83,11 @@ PAGES = {
     "robustness/fuzz_valgrind.md": "python bench/fuzz.py --watch valgrind --examples 80 --out valgrind"
     " && cp valgrind/fuzz.md results/robustness/fuzz_valgrind.md",
     "robustness/kills.md": BENCH.format("kills.py --trials 50 --seed 1920", "robustness"),
-    **{
-        f"robustness/{page}": BENCH.format(
-            f"mutants.py --seed {seed} --count {count} --map MAP --journal FILE --page {page}"
-            " --remarks results/robustness/mutants_remarks.toml",
-            "robustness",
-        )
-        for page, seed, count in (
-            ("mutants.md", 30001, 59),
-            ("mutants_2.md", 30002, 20),
-            ("mutants_3.md", 30003, 20),
-            ("mutants_4.md", 32001, 51),
-        )
-    },
+    "robustness/mutants.md": BENCH.format(
+        "mutants.py --seed 41001 --count 150 --seconds 20 --map MAP --journal FILE"
+        " --remarks results/robustness/mutants_remarks.toml",
+        "robustness",
+    ),
     "robustness/serve.md": BENCH.format("serve.py --drops 100 --rounds 3 --seed 17", "robustness"),
     "stiffness/README.md": "python -m cosim_studies.stiffness --out results/stiffness --force",
 }

@@ -61,7 +61,7 @@ class VirtualDrive:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        lockstep: bool = False,
+        lockstep: bool,
     ) -> None:
         period = 0 if lockstep else period_of(step)
         self._adapter, self._plant, key = CAdapter(), plant, key_of(machine.key_file)

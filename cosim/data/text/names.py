@@ -76,8 +76,7 @@ def unit_of_name(name: str, role: str = "") -> str:
             of a time is its unit; empty for any other column.
     """
     whole = split_unit(name)[1]
-    if not is_unit(whole) and (enclosed := bracketed(name)) and not is_unit(enclosed):
-        # What stands in brackets and is not known is asked for: `Winkel (kGrad)` is not in degrees.
+    if not is_unit(whole) and bracketed(name):  # it is asked for: `Winkel (kGrad)` is not in degrees
         return _of_time(name) if role == "t" else ""
     text = whole if is_unit(whole) else suffixed_unit(name, role)
     if role == "tau" and text == "nm":
