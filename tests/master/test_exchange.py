@@ -253,6 +253,12 @@ def test_partitions_run_in_the_order_of_time_and_priority(parts: Path) -> None:
     np.testing.assert_array_equal(seen["order"], [0, 41, 411, 141, 113, 341, 411])  # at 1.75 s 1, then 3
 
 
+@pytest.mark.parametrize(("step", "last"), [(0.25, 0.0), (0.25 * (1 + 1e-7), 0.25)], ids=["at the end", "before it"])
+def test_a_tick_at_the_end_of_a_step_is_of_the_next_and_one_before_it_of_this(parts: Path, step, last) -> None:
+    seen = alone(parts, [], {"last": "one.last"}, step=step, ticks=1, last=True).recording
+    np.testing.assert_array_equal(seen["last"], [0.0, last])
+
+
 def test_a_triggered_clock_ticks_where_its_input_says_so(parts: Path) -> None:
     given = {"hand": np.array([1.0, 0, 0, 1, 0, 0]), "two": 2.0}
     wires = [Wire("hand", "one.hand"), Wire("two", "one.scale")]
