@@ -166,7 +166,7 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
     scenario: Path, temporary: Path, tmp_path: Path, number: int, hang: bool
 ) -> None:
     written(scenario, "fail_at = 0.3, status = 12" if hang else "nan_at = 1e9")
-    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 2e5"))
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 3e4"))
     environment = ENVIRONMENT | {"TMPDIR": str(temporary)}
     command = command_of(scenario, tmp_path / "out")
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
@@ -196,7 +196,7 @@ def test_the_second_of_two_runs_into_one_folder_is_refused_while_the_first_lives
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     long = tmp_path / "long.toml"
-    long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 2e5"))
+    long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 3e4"))
     first = subprocess.Popen(command_of(long, tmp_path / "out"), env=ENVIRONMENT, stderr=subprocess.DEVNULL)
     until = time.monotonic() + 120
     while time.monotonic() < until and first.poll() is None and not list((tmp_path / "out").glob(".*.partial")):
