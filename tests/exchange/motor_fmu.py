@@ -20,7 +20,7 @@ SOURCE = (
     TINY[: TINY.index("enum {")]
     + r"""
 enum { I, J, D, FC, KT, GEAR, IDLE, CRASH_ABOVE, NAN_BELOW, HANG_BELOW, PLANTED, W, PHI, COUNT };
-typedef struct { double v[COUNT], late, before; char name[99]; void *log; } M;
+typedef struct { double v[COUNT], late, before; char name[99]; void *log; int final; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
 enum { CHATTER = -1, END = -2, EARLY = -3, STATUS = IDLE };

@@ -30,7 +30,6 @@ static int get(M *m, const unsigned *r, size_t n, double *x) {
   return 0;
 }
 static int save(M *m, M **s) { if (!*s) *s = make(); **s = *m; return 0; }
-static int restore(M *m, M *s) { if (m->final) return 3; *m = *s; m->final = 0; return 0; }
 static int step(M *m, double t, double h) {
   double e = m->v[K] * (m->v[A] - m->v[B]);
   m->v[Y] = m->v[MODE] > 0 ? e : m->v[Y] + h * e;
@@ -47,6 +46,7 @@ static int step(M *m, double t, double h) {
 #define API __attribute__((visibility("default")))
 API char calls[9]; /* what was called at the end: T terminate, F free */
 static int noted(char c) { calls[strlen(calls)] = c; return 0; }
+static int restore(M *m, M *s) { if (m->final) return 3; *m = *s; m->final = 0; return 0; }
 typedef struct { Log2 *log; } Callbacks;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
   M *m = make(); m->log = (void *)c->log; strncpy(m->name, n, 98); return m; }
