@@ -108,12 +108,12 @@ def pieces(item: Any) -> Iterator[tuple[slice, ...] | tuple[()]]:
     side = max(range(len(shape)), key=lambda place: shape[place])
     chunk = item.chunks[side] if item.chunks else 1
     across = item.size // shape[side]
-    beside = (
+    others = (
         prod(ceil(n / c) for n, c in zip(shape, item.chunks, strict=True)) / ceil(shape[side] / chunk)
         if item.chunks
         else 0
     )
-    chunks = min(max(1, CELLS // (across * chunk)), max(1, int(CHUNKS // beside)) if beside else CELLS)
+    chunks = min(max(1, CELLS // (across * chunk)), max(1, int(CHUNKS // others)) if others else CELLS)
     for first in range(0, shape[side], chunks * chunk):
         yield tuple(
             slice(first, first + chunks * chunk) if place == side else slice(None) for place in range(len(shape))

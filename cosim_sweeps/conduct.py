@@ -104,8 +104,8 @@ def _table(
         yield
     finally:
         rows = [row for _, row in sorted(journal.rows.items())]
-        told = {name: {UNIT_KEY: units.get(name, "").encode()} for name in sweep.columns}
-        fields = [pa.field(name, TYPES.get(name, pa.float64()), metadata=unit) for name, unit in told.items()]
+        metadata = {name: {UNIT_KEY: units.get(name, "").encode()} for name in sweep.columns}
+        fields = [pa.field(name, TYPES.get(name, pa.float64()), metadata=unit) for name, unit in metadata.items()]
         columns = [[row[one.name] if one.name in TYPES else float(row[one.name]) for row in rows] for one in fields]
         arrays = [pa.array(one, field.type, from_pandas=True) for one, field in zip(columns, fields, strict=True)]
         schema = pa.schema(fields, metadata={ORIGIN_KEY: json.dumps(origin).encode()})

@@ -118,8 +118,8 @@ def _comparison(path: Path) -> Shown:
     }
     page = path.with_name("compare.html")
     facts |= {"open": str(page)} if page.is_file() else {}
-    told = ("column", "other", "unit", "rms", "largest", "at")
-    rows = [{name: rounded(one[name]) for name in told} for one in document["differences"]]
+    columns = ("column", "other", "unit", "rms", "largest", "at")
+    rows = [{name: rounded(one[name]) for name in columns} for one in document["differences"]]
     return facts, {f"differences from {first}": rows}
 
 

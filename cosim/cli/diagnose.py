@@ -24,7 +24,7 @@ Propose = Annotated[
     Path | None, typer.Option("--propose", help="Folder for formulas outside the catalogue, as effects to review.")
 ]
 SHARED = ("motion", "columns", "units", "layout", "fmu", "variables", "quick", "with_possible")
-"""Options of one machine and of several, in the order in which the command is told again."""
+"""Options of one machine and of several, in the order in which the report repeats the command."""
 TOGETHER = ("motion", "fmu", "quick", "with_possible", "card", "workers", "cluster", "force")
 
 
@@ -69,7 +69,7 @@ def diagnose(
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
-    given = dict(locals())
+    given = dict(locals())  # all options by name, and nothing else: no variable may come before
     if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
         return _all(machines, out or _begun(train[0].resolve().stem), given)
     _check_single(workers, cluster)

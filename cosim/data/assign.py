@@ -131,14 +131,14 @@ def _one(request: Request, found: Columns, rule: str, free: Sequence[str], units
     for role in names:
         if found.roles.get(role) in free:
             return role, found.roles[role]
-        told = guess(role, free, units)
-        if role == "t" and len(told.among) > 1:
-            growing = tuple(name for name in told.among if questions.grows(found.values[name]))
-            told = replace(told, among=growing or told.among)
-        if told.name or (told.current and len(told.among) == 1 and role in request.units):
-            return role, told.among[0]
-        if told.among and role not in OPTIONAL:
-            raise questions.current(path, told) if told.current else questions.ambiguous(path, found, told)
+        guessed = guess(role, free, units)
+        if role == "t" and len(guessed.among) > 1:
+            growing = tuple(name for name in guessed.among if questions.grows(found.values[name]))
+            guessed = replace(guessed, among=growing or guessed.among)
+        if guessed.name or (guessed.current and len(guessed.among) == 1 and role in request.units):
+            return role, guessed.among[0]
+        if guessed.among and role not in OPTIONAL:
+            raise questions.current(path, guessed) if guessed.current else questions.ambiguous(path, found, guessed)
     if rule in found.lacks:
         raise RecordingError(f"{path} cannot serve here: {found.lacks[rule]}.", culprit=str(path), value=rule)
     return names[0], ""
@@ -148,5 +148,5 @@ def _notes(path: Path, roles: Mapping[str, str], units: Mapping[str, str]) -> tu
     if not roles:
         return ()
     scale = {ours: f" in {units[ours]}" if units.get(ours) else "" for ours in roles}
-    told = [f'{ours} = "{short(theirs)}"{scale[ours]}' for ours, theirs in roles.items()]
-    return (f"{path.stem}: by the names of its columns, {', '.join(told)}; --columns says it otherwise.",)
+    named = [f'{ours} = "{short(theirs)}"{scale[ours]}' for ours, theirs in roles.items()]
+    return (f"{path.stem}: by the names of its columns, {', '.join(named)}; --columns says it otherwise.",)

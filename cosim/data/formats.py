@@ -77,8 +77,8 @@ def _reader(path: Path, suffix: str) -> Callable[..., Columns]:
         plugged: Callable[..., Columns] = loaded(READERS, name)
         return plugged
     unknown = f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(recordings())}"
-    told = CONVERTED.get(path.suffix.lower(), unknown)
-    raise RecordingError(f"{path} is {told}.", culprit=str(path))
+    reason = CONVERTED.get(path.suffix.lower(), unknown)
+    raise RecordingError(f"{path} is {reason}.", culprit=str(path))
 
 
 def _check_file(path: Path) -> None:

@@ -39,24 +39,24 @@ def _question(
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=value, choices=choices)
 
 
-def ambiguous(path: Path, found: Columns, told: Guess) -> UndecidedError:
+def ambiguous(path: Path, found: Columns, guessed: Guess) -> UndecidedError:
     """Ask which of several columns it is."""
-    option = f"--columns {quote(f'{told.role}={told.among[0]}')}"
+    option = f"--columns {quote(f'{guessed.role}={guessed.among[0]}')}"
     text = (
-        f"{path}: {told.role} may be any of {listed(told.among)}; say which, for example {option}. "
-        f"{first_rows(found.values, told.among)}"
+        f"{path}: {guessed.role} may be any of {listed(guessed.among)}; say which, for example {option}. "
+        f"{first_rows(found.values, guessed.among)}"
     )
-    return _question(path, text, {"columns": {told.role: told.among[0]}}, told.role, told.among)
+    return _question(path, text, {"columns": {guessed.role: guessed.among[0]}}, guessed.role, guessed.among)
 
 
-def current(path: Path, told: Guess) -> UndecidedError:
+def current(path: Path, guessed: Guess) -> UndecidedError:
     """Ask for the torque constant of a motor whose current was recorded."""
-    name = told.among[0]
+    name = guessed.among[0]
     text = (
         f'{path} has no torque but a current, "{short(name)}". With the torque constant KT of the motor [N.m/A] it '
         f'becomes one: --columns {quote(f"tau={name}")} --units "tau=KT N.m", for example "tau=0.12 N.m".'
     )
-    return _question(path, text, {"columns": {"tau": name}, "units": {"tau": "1 N.m"}}, name, told.among)
+    return _question(path, text, {"columns": {"tau": name}, "units": {"tau": "1 N.m"}}, name, guessed.among)
 
 
 def share(path: Path, name: str, stated: str) -> UndecidedError:
@@ -119,8 +119,8 @@ def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
     """Ask for the unit of a column whose own is not known."""
     option = EXAMPLES.get(role, "1")
     kind = "unit of time" if role == "t" else "unit known here"
-    told = f'{path}: "{short(text)}" of column "{short(name)}" is no {kind}; say which it is in, for example '
-    return _question(path, f"{told}--units {role}={option}.", {"units": {role: option}}, text)
+    sentence = f'{path}: "{short(text)}" of column "{short(name)}" is no {kind}; say which it is in, for example '
+    return _question(path, f"{sentence}--units {role}={option}.", {"units": {role: option}}, text)
 
 
 def may_serve(found: Columns, lacking: Sequence[str], free: Sequence[str]) -> bool:

@@ -100,20 +100,20 @@ def first_card(
     on_progress("reading the torque balance")
     problem, best = _with_loads(*_base(recordings, motion, inertia), inertia, on_progress)
     numbers = tuple(_numbers(problem, best, inertia, linear))
-    beside = _with_neighbours(problem, _number(numbers), linear)
-    if beside:
+    coupled = _with_neighbours(problem, _number(numbers), linear)
+    if coupled:
         on_progress("reading the inertia beside the motion of the neighbours")
-        problem, best = _with_loads(*_base(recordings, motion, _within(beside)), _within(beside), on_progress)
-        numbers = (beside, *_numbers(problem, best, beside.value, linear)[1:])
+        problem, best = _with_loads(*_base(recordings, motion, _within(coupled)), _within(coupled), on_progress)
+        numbers = (coupled, *_numbers(problem, best, coupled.value, linear)[1:])
     tau = problem.weight * problem.prepared.stacked("tau")
     if is_asked or not _is_small(problem, tau, numbers):
         _check_inertia(numbers, linear)
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
     notes = _notes(numbers, explained)
-    if beside and beside.is_determined:
-        low, high = beside.range
-        said = f"{beside.value:.3g} {beside.unit} (95 %: {low:.3g} to {high:.3g})"
+    if coupled and coupled.is_determined:
+        low, high = coupled.range
+        said = f"{coupled.value:.3g} {coupled.unit} (95 %: {low:.3g} to {high:.3g})"
         names = ", ".join(one.name for one in problem.prepared.neighbours)
         notes.insert(0, f"The inertia shows only beside the motion of {names}: {said}.")
     return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(notes))

@@ -75,8 +75,8 @@ def of_page(sheets: Sequence[Sheet], records: Sequence[Json], first: str = "all"
         first: the span that is shown first.
         more: `differences` [name, one, other] that the page takes itself, `open`: the record that is shown first.
     """
-    told: JsonObject = {"sheets": [sheet.as_json() for sheet in sheets], "differences": more.get("differences", [])}
-    return told | {"recordings": records, "first": first, "open": more.get("open", 0)}
+    page: JsonObject = {"sheets": [sheet.as_json() for sheet in sheets], "differences": more.get("differences", [])}
+    return page | {"recordings": records, "first": first, "open": more.get("open", 0)}
 
 
 def script_of_page() -> tuple[str, str]:

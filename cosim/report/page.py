@@ -81,10 +81,10 @@ def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
     seconds = sum(recorded) or sum(float(trace.t[-1] - trace.t[0]) for trace in diagnosis.traces if trace.t.size)
     rates = [entry["rate_hz"] for entry in made.get("recordings", ()) if entry.get("rate_hz")]
     rest = f", {seconds:.0f} s" + (f" at {_rate(rates[0])}" if rates else "")
-    told = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
-    told.append(("Model", words.model(diagnosis), ""))
-    told.append(("cosim", str(made.get("version", "")), ""))
-    return [dict(zip(("label", "value", "rest"), part, strict=True)) for part in told if part[1]]
+    facts = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
+    facts.append(("Model", words.model(diagnosis), ""))
+    facts.append(("cosim", str(made.get("version", "")), ""))
+    return [dict(zip(("label", "value", "rest"), part, strict=True)) for part in facts if part[1]]
 
 
 def _rate(hertz: float) -> str:
@@ -226,9 +226,9 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, obj
     """Return parameters, quality, provenance, explorer."""
     made, here = diagnosis.provenance, resources("cosim.report")
     script, digest = script_of_page()
-    told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
-    told += [f"seed {made['seed']}"] if "seed" in made else []
-    told += [f"{diagnosis.seconds:.1f} s"] if diagnosis.seconds else []
+    details = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
+    details += [f"seed {made['seed']}"] if "seed" in made else []
+    details += [f"{diagnosis.seconds:.1f} s"] if diagnosis.seconds else []
     return {
         "parameters": tables.parameters(diagnosis),
         "parameters_sentence": " ".join(_refitted(diagnosis)),
@@ -236,7 +236,7 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, obj
         "quality": diagnosis.data_quality,
         "command": str(made.get("command", "")),
         "files": tables.files(diagnosis),
-        "made": ", ".join(str(text) for text in told if text),
+        "made": ", ".join(str(text) for text in details if text),
         "data": payload(diagnosis, scales),
         "script": script,
         "script_hash": digest,

@@ -110,11 +110,11 @@ def _block(block: Block, scales: Scales) -> list[str]:
 
 def _row(word: str, finding: Finding, scales: Scales) -> list[str]:
     """Return answer, name and size with its range of a finding, and below it probability and place."""
-    told = f"probability {finding.probability:.2f}" if finding.answer in ("found", "ambiguous") else ""
+    likely = f"probability {finding.probability:.2f}" if finding.answer in ("found", "ambiguous") else ""
     size, size_range = words.sized(finding)
     columns = f"  {word:<9} {lowered(finding.title):<{NAME}} {size:<{SIZE}} {size_range:<{RANGE}}"
     first = textwrap.wrap(printable(columns.rstrip()), WIDTH, subsequent_indent=" " * 12) or [""]
-    return first + _wrapped(", ".join(text for text in (told, where(finding, scales)) if text), 12)
+    return first + _wrapped(", ".join(text for text in (likely, where(finding, scales)) if text), 12)
 
 
 def _wrapped(text: str, indent: int) -> list[str]:
@@ -126,8 +126,8 @@ def _formulas(diagnosis: Diagnosis) -> list[str]:
     """Return each closed form that is as good on unseen recordings as what was learned, with its numbers."""
     lines = []
     for one in diagnosis.learned.get("formula", ()):
-        told = {name: f"{number['value']:.3g} {number['unit']}" for name, number in one["parameters"].items()}
-        numbers = ", ".join(f"{name} {text.removesuffix(' 1')}" for name, text in told.items())
+        parameters = {name: f"{number['value']:.3g} {number['unit']}" for name, number in one["parameters"].items()}
+        numbers = ", ".join(f"{name} {text.removesuffix(' 1')}" for name, text in parameters.items())
         lines += _wrapped(f"As good, and shorter: {one['equation']}; {numbers}", 0)
     return lines
 

@@ -129,10 +129,11 @@ OOPS = {"tau": ["1"] * 3 + ["oops"] * 197}
         (FULL, {"units": {"position": "deg"}}, 'has no column "position" to give a unit to; it has: t, tau, q.'),
         (FULL, {"columns": {"load": "tau"}}, "has no column tau; it has: t, load, q. Name it with --columns tau=..."),
         (FULL, {"columns": {"angle": "q"}}, "has no column q or v; it has: t, tau, angle."),
+        (FULL, {"required": ("tau", "cable|oil")}, "has no column cable or oil; it has: t, tau, q. Name it with "),
     ],
 )
 def test_numbers_that_break_a_rule_and_names_that_are_not_there_are_named(
-    tmp_path: Path, table: dict[str, np.ndarray], given: dict[str, dict[str, str]], sentence: str
+    tmp_path: Path, table: dict[str, np.ndarray], given: dict[str, Any], sentence: str
 ) -> None:
     path = csv_file(tmp_path / "run.csv", table)
     with pytest.raises(RecordingError, match=re.escape(sentence)) as caught:

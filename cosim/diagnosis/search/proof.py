@@ -98,7 +98,7 @@ class Validation:
 
         First the length of the list: effects in order of their evidence, up to where the held-out recordings are
         predicted best; stopping at the first that does not help would lose a later one that does. Then effects are
-        taken out until all that are left stand, and those of which no size is told, unless they surely predict.
+        taken out until all that are left stand, and those whose size is not determined, unless they surely predict.
         """
         order = sorted(self.examined.effects, key=lambda one: -one.own.evidence)
         chosen, standing, gains = self._with_size(*self._longest(order))
@@ -128,10 +128,10 @@ class Validation:
     def _with_size(self, chosen: Fit, some: Sequence[AcceptedEffect]) -> Way:
         """The effects that stand, but for those of which recordings tell no size, unless they surely predict."""
         chosen, standing, gains = self._standing(chosen, some)
-        told = [one for one in standing if self._is_sure(chosen, one, gains[one.effect.name])]
-        if len(told) == len(standing):
+        sized = [one for one in standing if self._is_sure(chosen, one, gains[one.effect.name])]
+        if len(sized) == len(standing):
             return chosen, standing, gains
-        fit, kept, known = self._standing(self._with(told), told)
+        fit, kept, known = self._standing(self._with(sized), sized)
         return fit, kept, gains | known
 
     def _standing(self, chosen: Fit, some: Sequence[AcceptedEffect]) -> Way:

@@ -133,19 +133,19 @@ class _Examination:
         """
         without = self.comparison.problem.without(chosen, group[0].name)
         own = weighed(self.comparison, chosen, without, effect=group[0])
-        beside = self.stage_after(without, own if len(group) == 1 and not group[0].source else None)
-        if beside.current is without:
-            return beside, own
-        return beside, weighed(self.comparison, chosen, beside.current, effect=group[0])
+        stage = self.stage_after(without, own if len(group) == 1 and not group[0].source else None)
+        if stage.current is without:
+            return stage, own
+        return stage, weighed(self.comparison, chosen, stage.current, effect=group[0])
 
-    def grown(self, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
+    def grown(self, effects: Sequence[AcceptedEffect], stage: Stage) -> Fit | None:
         """The structure with one more effect, of which the search, which went another way, may not have known."""
         if any(is_small(one.own, self.comparison.policy) for one in effects):
             return None
-        best = best_of(self.comparison, beside, max((one.own.evidence for one in effects), default=0.0))
+        best = best_of(self.comparison, stage, max((one.own.evidence for one in effects), default=0.0))
         if best is None or is_full(best, self.comparison):
             return None
-        return at_its_end(self.comparison, best, beside.current).fit
+        return at_its_end(self.comparison, best, stage.current).fit
 
     def round(self, chosen: Fit) -> tuple[list[AcceptedEffect], Fit | None]:
         """The effects of a structure, each challenged; none and another structure where one of them gives way."""
@@ -170,13 +170,13 @@ class _Examination:
         comparison, problem, name = self.comparison, self.comparison.problem, group[0].name
         self.refits.on_progress(group[0].title)
         rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-        beside, own = self.without(chosen, group)
-        others = [one for one in beside.tried if one.effect.name != name]
+        stage, own = self.without(chosen, group)
+        others = [one for one in stage.tried if one.effect.name != name]
         if len(rest) > len(problem.mount.effects):
             standing = replace(chosen.mount, effects=rest)
             # Another start gained 71 nats once and 2 at most else (65 fits of 30 cases): none comes back from so far.
             others = [
-                refitted_from_here(comparison, standing, beside.current, one)
+                refitted_from_here(comparison, standing, stage.current, one)
                 if own.evidence - one.evidence < comparison.policy.sure
                 else one
                 for one in others
@@ -186,14 +186,14 @@ class _Examination:
             if rival.effect.name not in best or rival.evidence > best[rival.effect.name].evidence:
                 best[rival.effect.name] = rival
         near = [key for key, rival in best.items() if contest(comparison, own, rival) < comparison.policy.clear]
-        best |= {key: at_its_end(comparison, best[key], beside.current) for key in near}
+        best |= {key: at_its_end(comparison, best[key], stage.current) for key in near}
         misfits = misfits_of(problem.prepared, chosen.mount, group[0])
         margins = {key: margin(comparison, own, rival) for key, rival in best.items()}
         ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.name])
         contests = {rival.effect.name: contest(comparison, own, rival) for rival in ranked}
-        fewer = [one for one in beside.tried if one.effect.name == name and one.fit.count < own.fit.count]
+        fewer = [one for one in stage.tried if one.effect.name == name and one.fit.count < own.fit.count]
         simpler = tuple(fewer) if group[0].source else ()
-        one = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits, simpler)
+        one = AcceptedEffect(group, own, stage.current, tuple(ranked), margins, contests, misfits, simpler)
         found = with_names(one)
         _enter(comparison, found)
         return found

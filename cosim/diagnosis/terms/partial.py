@@ -51,8 +51,8 @@ class Partial:
         mean, half = self._means(np.ravel_multi_index(places, counts), int(np.prod(counts)))
         value, band = (_listed(one.reshape(counts)) for one in (mean, half))
         at, *by_at = [((edge[1:] + edge[:-1]) / 2).tolist() for edge in edges]
-        told: BinsEntry = {"at": at, "value": value, "band": band}
-        return {**told, "by_at": by_at[0]} if by_at else told
+        entry: BinsEntry = {"at": at, "value": value, "band": band}
+        return {**entry, "by_at": by_at[0]} if by_at else entry
 
     def _means(self, cell: Any, many: int) -> tuple[Array, Array]:
         """Weighted mean of each cell, and its half band from what blocks of rows differ by."""

@@ -118,14 +118,14 @@ def beyond_denial(sanity: Sequence[Sanity]) -> tuple[Sanity, ...]:
     return tuple(one for one in sanity if one.finding != "clocks")
 
 
-def without_denied(sanity: Sequence[Sanity], chosen: Fit, beside: Stage) -> tuple[Sanity, ...]:
+def without_denied(sanity: Sequence[Sanity], chosen: Fit, stage: Stage) -> tuple[Sanity, ...]:
     """Leave out that position and torque are not of one time, where the model that stands wants no such lag.
 
     A ripple over the position, a shaking ground or friction that creeps look late to a balance of inertia, friction and
-    load. The model knows more: beside its effects, what is late is of that size or is not there. `beside` is what was
-    tried beside it.
+    load. The model knows more: with its effects, what is late is of that size or is not there. `stage` is what was
+    tried in addition to them.
     """
-    gained = [one for one in beside.tried if one.evidence > 0 and hypothesis_of(one.effect).is_timing]
+    gained = [one for one in stage.tried if one.evidence > 0 and hypothesis_of(one.effect).is_timing]
     fits = [chosen, *(one.fit for one in gained)]
     timing = [one for fit in fits for one in fit.mount.effects if hypothesis_of(one).is_timing]
     lags = [abs(float(getattr(one, one.main.parameter)) / 1e3) for one in timing]  # they count in milliseconds
